@@ -98,11 +98,12 @@ rule all:
         [[*dataset.files, *dataset.intermediates] for dataset in RUN.chosen],
         f"{RUN.results}/index.html",
         RUN.build.family_targets,
+        [PLAN.batch_receipts({"family": family}) for family in RUN.build.family_names],
 
 
 rule report_html:
     input:
-        [dataset.paths.page for dataset in RUN.chosen],
+        RUN.build.pages,
         f"{RUN.results}/index.html",
 
 
@@ -113,5 +114,4 @@ rule smoke:
 
 rule package:
     input:
-        [dataset.sequence_paths.package for dataset in RUN.chosen],
-        RUN.build.documents,
+        RUN.of_build(RUN.build.packages),

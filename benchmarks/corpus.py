@@ -21,9 +21,10 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "scripts"))
 
 from family_build import FamilyBuild
+from lightfield.configuration.corpus import MEMBERS
 from lightfield.core.cli import run
 from lightfield.core.errors import UserError
-from lightfield.core.files import read_json
+from lightfield.core.files import read_json, read_json_lines
 from lightfield.core.progress import Progress
 from lightfield.validation import verification
 
@@ -82,7 +83,8 @@ def problems(build: FamilyBuild, expected: dict[str, Any], kills: int) -> list[s
 
 def stage_seconds(build: FamilyBuild) -> dict[str, float]:
     """Return the mean CPU seconds of each stage of the valid members."""
-    times = [read_json(path) for path in build.root.glob("work/chairs/*/cpu_seconds.json")]
+    members = read_json_lines(build.root / RESULTS / MEMBERS)
+    times = [member["stage_cpu_seconds"] for member in members if member["state"] == "valid"]
     stages = dict.fromkeys(stage for entry in times for stage in entry)
     return {stage: statistics.fmean(entry.get(stage, 0.0) for entry in times) for stage in stages}
 

@@ -75,3 +75,18 @@ rule count_members:
         f"python {RUN.scripts}/count_members.py"
         " --settings {input.settings} --corpus {input.corpus} --failed {params.failed}"
         " --output {output.members} --receipt {output.receipt} > {log} 2>&1"
+
+
+# It has no output. The corpora come first: then no list of checksums has what is removed.
+rule prune:
+    input:
+        RUN.build.corpora,
+    log:
+        RUN.log_of("prune"),
+    localrule: True
+    params:
+        prune=PLAN.prune_command,
+    message:
+        "Removing what the chosen families no longer have"
+    shell:
+        "{params.prune} 2>&1 | tee {log}"

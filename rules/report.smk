@@ -7,6 +7,7 @@ from lightfield.workflow.jobs import (
     PAGE,
     PANORAMA_LIGHTFIELD,
     RENDER_PANORAMA,
+    SEQUENCE_PAGE,
 )
 
 
@@ -130,13 +131,41 @@ rule page:
         " {params.inventory} --output {output.page} --receipt {output.receipt} > {log} 2>&1"
 
 
+# A sequence has a page of its own, beside the pages of its frames.
+rule sequence_page:
+    input:
+        PLAN.reads(
+            SEQUENCE_PAGE,
+            views=RUN.of_build(RUN.build.shown_frames),
+        ),
+    output:
+        page=update(RUN.paths.sequence_page),
+        receipt=PLAN.receipt_of(SEQUENCE_PAGE),
+    log:
+        RUN.log_of(SEQUENCE_PAGE),
+    benchmark:
+        RUN.times_of(SEQUENCE_PAGE)
+    wildcard_constraints:
+        rig="[A-Za-z0-9_.-]+",
+    localrule: True
+    params:
+        rig=subpath(output.page, ancestor=2),
+    message:
+        "Making the page of the sequence {wildcards.scene}/{wildcards.rig}"
+    shell:
+        f"python {RUN.scripts}/report_sequence.py"
+        " --rig {params.rig} --name {wildcards.scene}/{wildcards.rig}"
+        " --settings {input.settings} --output {output.page} --receipt {output.receipt}"
+        " > {log} 2>&1"
+
+
 # Runs of other scenes make it, too: its receipt has the pages of all datasets.
 rule index:
     input:
         PLAN.reads(
             INDEX,
             are_noted=True,
-            pages=[dataset.paths.page for dataset in RUN.chosen],
+            pages=RUN.build.pages,
             corpora=RUN.build.corpus_lists,
         ),
     output:

@@ -505,6 +505,9 @@ REFUSED = [
 EXPLAINED = [
     ("family", {}, "family: must have one of seeds and models"),
     ("family", {"seeds": "0-9", "models": "*.glb"}, "family: must have one of seeds and models"),
+    ("family", {"models": 7}, "family.models: is 7; must be a text"),
+    ("family", {"models": []}, "family.models: is []; must be a text or have at least 1 item"),
+    ("family", {"models": ["*.obj", 3]}, "family.models.[1]: is 3; must be a text"),
     ("family", {"seeds": "9"}, 'family.seeds: is "9"; must be the first and the last seed'),
     ("family", {"seeds": 9}, "family.seeds: is 9; must be a text"),
     ("family", {"seeds": "9-0"}, "family.seeds: is '9-0'; must have the smaller seed first"),

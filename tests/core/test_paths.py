@@ -109,6 +109,15 @@ def test_unfinished_files_behind_links_are_removed(tmp_path):
     assert not unfinished.exists()
 
 
+def test_unfinished_files_of_the_excluded_folder_stay(tmp_path):
+    others = [
+        write(tmp_path / f"{name}/.a.png.123.tmp.png") for name in ("page", "exr", "exr/page")
+    ]
+    removed = leftovers.remove_unfinished(tmp_path, age=-1, excluded="page")
+    assert sorted(removed) == sorted(others[1:])
+    assert others[0].exists()
+
+
 def test_a_place_is_found_through_the_links_to_its_folder(tmp_path):
     write(tmp_path / "disk/rig/exr/a.exr")
     (tmp_path / "big").mkdir()

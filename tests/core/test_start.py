@@ -47,6 +47,7 @@ LIGHT = [
     "import_views",
     "plan",
     "probe",
+    "prune",
     "render_shard",
     "splits",
     "status",

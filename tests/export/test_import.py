@@ -16,6 +16,7 @@ from checkouts import ROOT, planned, snakemake
 from pydantic import TypeAdapter
 from sphere import write_views
 
+from lightfield.configuration.config_file import Preset
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, sha256
@@ -269,6 +270,16 @@ def test_a_view_replaced_by_an_older_file_of_equal_size_is_imported_again(
     job.run()
     assert Path(dataset.paths.views, views[0].name).read_bytes() == views[0].read_bytes()
     assert outdated() == []
+
+
+def test_a_preset_keeps_the_resolution_of_imported_views(published, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (full,) = scene_datasets("theirs")
+    (small,) = scene_datasets("theirs", "tiny", Preset(resolution=12, views=4))
+    assert small.rig.camera.resolution == full.rig.camera.resolution == (48, 48)
+    assert small.view_count == 4
+    reprojection = small.reprojections["perspective"].camera
+    assert max(reprojection.resolution) == 12
 
 
 @pytest.mark.slow

@@ -188,6 +188,92 @@ def test_a_rig_that_tests_is_exported_with_the_trained_one(tmp_path, monkeypatch
     assert jobs["validate"] == 1
 
 
+TWO_RIGS = SCENE | {
+    "rigs": {
+        "inner": {"type": "sphere", "subdivisions": 1, "split": "train", "camera": PERSPECTIVE},
+        "outer": {**PLANE, "split": "train", "camera": PERSPECTIVE},
+        "along": {"type": "spiral", "count": 5, "split": "test", "camera": PERSPECTIVE},
+        "alone": {**PLANE, "camera": PERSPECTIVE},
+    },
+    "exports": {
+        "colmap": {"sources": ["small"], "together": ["inner", "outer", "along"]},
+        "poses_csv": {"sources": ["small"]},
+    },
+}
+
+
+@pytest.mark.slow
+def test_two_rigs_that_train_go_into_one_export(tmp_path, monkeypatch):
+    (tmp_path / "two.yaml").write_text(json.dumps(TWO_RIGS))
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
+    datasets = {dataset.rig_name: dataset for dataset in scene_datasets("two")}
+    exported_formats = {rig: [*d.exports.selected] for rig, d in datasets.items()}
+    assert exported_formats == {
+        "inner": ["colmap", "poses_csv"],
+        "outer": ["poses_csv"],
+        "along": ["poses_csv"],
+        "alone": ["poses_csv"],
+    }
+    (tmp_path / "checkout").mkdir()
+    folder = checkout(tmp_path / "checkout", two=json.dumps(TWO_RIGS))
+    jobs = planned(folder, "--config", "scenes=two", "rigs=inner", "preset=full")
+    # The other two rigs are rendered for it, but they have no page.
+    assert (jobs["lightfield"], jobs["render"], jobs["reproject"]) == (3, 3, 3)
+    assert (jobs["export"], jobs["validate"]) == (2, 1)
+
+
+def test_two_rigs_of_a_sequence_are_exported_together_frame_by_frame(tmp_path, monkeypatch):
+    rig = {**PLANE, "camera": PERSPECTIVE, "frames": {"first": 1, "last": 2}}
+    content = SCENE | {
+        "rigs": {"inner": rig, "outer": rig | {"size": 3}},
+        "exports": {"dnerf": {"sources": ["small"], "together": ["inner", "outer"]}},
+    }
+    (tmp_path / "moving.yaml").write_text(json.dumps(content))
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
+    first, second, *others = scene_datasets("moving")
+    for frame, dataset in (("f00001", first), ("f00002", second)):
+        (export,) = dataset.exports.selected.values()
+        assert dataset.rigs_beside(export) == (f"outer/{frame}",)
+        assert dataset.sequence_exports == ["results/moving/inner/small/exports/dnerf/export.json"]
+    assert all(not dataset.exports.selected for dataset in others)
+
+
+@pytest.mark.parametrize(
+    ("together", "changes", "expected"),
+    [
+        (["inner", "other"], {}, "exports.colmap.together: there is no rig 'other'"),
+        (["inner"], {}, "exports.colmap.together: .*at least 2"),
+        (["inner", "inner"], {}, "exports.colmap.together: is .*each once"),
+        (["along", "inner", "outer"], {}, "together: begins with along, which tests; name a rig"),
+        (["inner", "outer"], {}, "exports.colmap.together: lacks along; must have all rigs of the"),
+        (["inner", "outer", "along", "alone"], {}, "only one of inner and alone has a split"),
+        (
+            ["alone", "near"],
+            {"near": {**PLANE, "camera": PERSPECTIVE | {"fov": 60}}},
+            "rigs.near.camera: must be as in alone; see exports.colmap.together",
+        ),
+    ],
+)
+def test_rigs_that_cannot_go_into_one_export_are_refused(together, changes, expected):
+    content = json.loads(json.dumps(TWO_RIGS))
+    content["rigs"] |= changes
+    content["exports"]["colmap"]["together"] = together
+    with pytest.raises(UserError, match=expected):
+        checked(TypeAdapter(scene_yaml.Scene), content, "scene.yaml")
+
+
+@pytest.mark.parametrize(
+    ("export", "expected"),
+    [
+        ({"colmap": {"sources": ["small"], "rigs": ["a"], "together": ["a", "b"]}}, "not both"),
+        ({"poses_csv": {"sources": ["small"], "together": ["a", "b"]}}, "together: unknown key"),
+    ],
+)
+def test_together_is_for_training_and_in_place_of_rigs(export, expected):
+    with pytest.raises(UserError, match=expected):
+        checked(TypeAdapter(scene_yaml.Scene), TWO_RIGS | {"exports": export}, "scene.yaml")
+
+
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     """A scene's folder with a rig to train on, one for validation, and one to test with."""
@@ -237,6 +323,37 @@ def test_the_lists_of_nerfstudio_and_colmap_follow_the_split(scene, tmp_path):
         f"along_view_000{i}f.png" for i in range(4)
     ]
     assert len(pycolmap.Reconstruction(folder / "sparse/0").images) == 12
+
+
+def test_the_views_of_two_rigs_that_train_are_in_one_model(scene, tmp_path):
+    """COLMAP's own library reads it. All cameras are where the rigs' lightfield.json say."""
+    joined = tmp_path / "scene"
+    shutil.copytree(scene, joined)
+    for prefix in ("", "small/"):
+        path = joined / "near" / f"{prefix}lightfield.json"
+        content = json.loads(path.read_text().replace('"validation"', '"train"'))
+        path.write_text(json.dumps(content))
+    folder = exported(joined, "colmap", tmp_path / "colmap", points=200)
+    images = pycolmap.Reconstruction(folder / "sparse/0").images.values()
+    test_names = (folder / "sparse/0/test.txt").read_text().split()
+    train = {image.name for image in images} - {*test_names}
+    assert train == {f"{name}.png" for name in NAMES["train"] | NAMES["val"]}
+    centres = {image.name: image.projection_center() for image in images}
+    for rig, prefix in (("around", ""), ("near", "near_"), ("along", "along_")):
+        for view in LightField.read(joined / rig / "small" / "lightfield.json").views:
+            np.testing.assert_allclose(
+                centres[f"{prefix}{view.name}.png"], view.position, atol=1e-6
+            )
+    names = {path.name for path in (folder / "images").iterdir()}
+    assert names == {*centres}
+
+
+def test_views_of_two_rigs_with_one_name_are_refused(scene, tmp_path):
+    shutil.copytree(scene, tmp_path / "scene")
+    for path in (tmp_path / "scene/around").rglob("lightfield.json"):
+        path.write_text(path.read_text().replace("view_0000f", "near_view_0000f"))
+    with pytest.raises(UserError, match=r"near/small/lightfield.json: .*near_view_0000f"):
+        exported(tmp_path / "scene", "nerfstudio", tmp_path / "export", points=200)
 
 
 def test_points_come_only_from_the_training_views(scene, tmp_path):

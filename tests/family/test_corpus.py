@@ -1,6 +1,8 @@
 """The corpus of a family: its split, its statistics, its page, its shards, and its sums."""
 
+import csv
 import json
+import re
 import shutil
 import subprocess
 import tarfile
@@ -106,6 +108,30 @@ def test_a_corpus_opens_as_a_list_of_its_valid_members(built):
         open_dataset(built)
 
 
+def test_the_shards_of_all_parts_open_as_the_corpus(built, tmp_path):
+    """Also where only they were copied."""
+    shards = shutil.copytree(built / "shards", tmp_path / "shards")
+    data = {each.member["name"]: each for each in open_corpus(shards)}
+    assert {name: each.member["split"] for name, each in data.items()} == {
+        each.member["name"]: each.member["split"] for each in open_corpus(built)
+    }
+    assert [len(each.views) for each in data.values()] == [3] * 6
+
+
+def test_missing_shards_of_a_corpus_are_named(built, tmp_path):
+    family = shutil.copytree(built, tmp_path / "chairs")
+    *_, last = sorted(family.glob("shards/train/*.tar"))
+    shards = shutil.copytree(family / "shards", tmp_path / "shards")
+    # The family's checksums list the last shard. Without them, there must be no gap.
+    last.unlink()
+    (shards / "train/chairs-train-00000.tar").unlink()
+    for folder, missing in ((family / "shards", last.name), (shards, "chairs-train-00000.tar")):
+        for place in (folder, folder / "train"):
+            with pytest.raises(UserError, match=f"shards/train: misses {re.escape(missing)}"):
+                open_corpus(place)
+    assert open_corpus(family / "shards/train/chairs-train-00000.tar")
+
+
 def part_of(family, data):
     members = read_json(family / "corpus.json")["members"]
     return next(each["split"] for each in members if each["name"] == data.member["name"])
@@ -204,6 +230,23 @@ def test_a_dataset_that_changed_after_its_record_is_refused(family):
 def test_shares_above_one_are_refused():
     with pytest.raises(ValueError, match="at most 1"):
         Shares(validation=0.6, test=0.6)
+
+
+# ---- what members took -----------------------------------------------------------------------
+
+KEYS = "name state split seed model views bytes built seconds cpu_seconds stage_cpu_seconds"
+KEYS = [*KEYS.split(), "failed_stage", "error", "log"]
+
+
+def test_each_member_has_a_line_of_json_with_all_keys(built):
+    rows = [json.loads(line) for line in (built / "report/members.jsonl").read_text().splitlines()]
+    assert [row["name"] for row in rows] == [*(f"{n:04d}" for n in range(6)), "broken"]
+    assert all([*row] == KEYS for row in rows)
+    assert (rows[2]["state"], rows[2]["seed"], rows[2]["views"]) == ("valid", 2, 3)
+    assert rows[2]["error"] is None
+    assert (rows[-1]["state"], rows[-1]["model"]) == ("failed", "models/broken.glb")
+    assert (rows[-1]["failed_stage"], rows[-1]["error"]) == ("import_model", CAUSE)
+    assert rows[-1]["log"] == "work/chairs/broken/log"
 
 
 # ---- equal bytes -----------------------------------------------------------------------------
@@ -342,6 +385,165 @@ def test_two_members_with_the_same_key_in_shards_are_named(family):
         make(family, shards=True, splits={"validation": 0, "test": 0})
 
 
+# ---- shards that grow -------------------------------------------------------------------------
+
+# A shard has the three views of one member, or fewer: each takes about 4 kB, and the tar 10.
+SMALL = {"shards": True, "shard_gigabytes": 2.4e-5, "splits": {"validation": 0, "test": 0}}
+
+
+def add(family, *numbers, shade=1.0):
+    for number in numbers:
+        families.add_member(family, f"{number:04d}", shade=shade)
+
+
+def shard_bytes(family):
+    return {path.name: path.read_bytes() for path in sorted(family.glob("shards/train/*.tar"))}
+
+
+def keys(family):
+    """Return the keys of all samples, in the order in which a loader reads them."""
+    tars = sorted(family.glob("shards/train/*.tar"))
+    return [name.split(".")[0] for tar in tars for name in samples(tar) if name.endswith(".json")]
+
+
+def keys_of(*numbers):
+    return [f"{n:04d}_plane_view_{view:04d}f" for n in numbers for view in range(3)]
+
+
+def names_of(*numbers):
+    return [f"chairs-train-{number:05}.tar" for number in numbers]
+
+
+@pytest.fixture
+def grown(tmp_path):
+    """A family of members 2, 4 and 6 whose corpus has shards."""
+    family = tmp_path / "results/chairs"
+    add(family, 2, 4, 6)
+    make(family, **SMALL)
+    assert keys(family) == keys_of(2, 4, 6)
+    assert len(shard_bytes(family)) > 2
+    return family
+
+
+@pytest.mark.parametrize("has_index", [True, False], ids=["", "of an older version"])
+def test_new_members_leave_all_shards_but_the_last_as_they_are(grown, has_index):
+    before = shard_bytes(grown)
+    times = {path.name: path.stat().st_mtime_ns for path in grown.glob("shards/train/*.tar")}
+    if not has_index:
+        (grown / "shards/views.csv").unlink()
+    add(grown, 3, 1)
+    make(grown, **SMALL)
+    after = shard_bytes(grown)
+    assert [*after][: len(before)] == [*before]
+    *full, _ = before
+    assert {name: after[name] for name in full} == {name: before[name] for name in full}
+    if has_index:
+        # Nobody has written them again.
+        assert {n: (grown / "shards/train" / n).stat().st_mtime_ns for n in full} == {
+            name: times[name] for name in full
+        }
+    # New members follow in the order of their names, and the shards are as full as before.
+    assert keys(grown) == keys_of(2, 4, 6, 1, 3)
+    assert all(len(content) <= 3 * 10_240 for content in after.values())
+    assert faults(grown) == {}
+    assert len(open_corpus(grown / "shards/train")) == 5
+
+
+def test_a_second_growth_goes_on_with_the_last_shard(grown):
+    for number in (3, 1, 0):
+        add(grown, number)
+        *full, _ = shard_bytes(grown).items()
+        make(grown, **SMALL)
+        assert shard_bytes(grown).items() >= {*full}
+    assert keys(grown) == keys_of(2, 4, 6, 3, 1, 0)
+    # Nothing else fits into any shard but the last.
+    together = shutil.copytree(grown, grown.with_name("other") / "chairs")
+    shutil.rmtree(together / "shards")
+    make(together, **SMALL)
+    assert len(shard_bytes(together)) == len(shard_bytes(grown))
+    assert keys(together) == keys_of(0, 1, 2, 3, 4, 6)
+
+
+def test_a_member_that_goes_or_changes_renews_only_its_own_shards(grown):
+    def shards_of(number):
+        return {
+            path.name
+            for path in grown.glob("shards/train/*.tar")
+            if any(name.startswith(f"{number:04d}_") for name in samples(path))
+        }
+
+    before, touched = shard_bytes(grown), shards_of(2)
+    shutil.rmtree(grown / "0002")
+    add(grown, 2, shade=3)
+    make(grown, **SMALL)
+    after = shard_bytes(grown)
+    assert {name for name in before if before[name] != after.get(name)} == touched
+    assert keys(grown) == keys_of(2, 4, 6)
+    assert faults(grown) == {}
+
+    # Its views go. A shard that has no view any more leaves its number to the next.
+    shutil.rmtree(grown / "0002")
+    make(grown, **SMALL)
+    gone = after.keys() - shard_bytes(grown).keys()
+    assert [*shard_bytes(grown)] == names_of(*range(len(after) - len(gone)))
+    assert keys(grown) == keys_of(4, 6)
+    kept = [content for name, content in after.items() if name not in touched]
+    assert {*shard_bytes(grown).values()} >= {*kept}
+    assert faults(grown) == {}
+
+
+def test_the_index_says_which_shard_has_which_view(grown):
+    add(grown, 1)
+    make(grown, **SMALL)
+    with (grown / "shards/views.csv").open() as file:
+        rows = [*csv.DictReader(file)]
+    assert [row["sample"] for row in rows] == keys(grown)
+    for row in rows:
+        content = json.loads(samples(grown / "shards" / row["shard"])[f"{row['sample']}.json"])
+        told = {key: content[key] for key in ("member", "rig", "view", "split")}
+        assert told == {key: row[key] for key in told}
+    assert "shards/views.csv" in (grown / "sha256sums.txt").read_text()
+    make(grown)
+    assert not [path for path in grown.glob("shards/**/*") if path.is_file()]
+
+
+@pytest.mark.parametrize("name", ["train/chairs-train-00001.tar", "views.csv"])
+@pytest.mark.parametrize("damage", ["flipped", "deleted"])
+def test_a_damaged_shard_or_index_gets_its_bytes_again(grown, monkeypatch, name, damage):
+    monkeypatch.chdir(grown.parents[1])
+    family, receipt = Path("results/chairs"), Path("work/receipts/chairs/corpus.jsonl")
+    add(family, 3, 1)
+    make(family, receipt=receipt, cache=Path("looks.json"), **SMALL)
+    before = files(family / "shards")
+    path = family / "shards" / name
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.unlink()
+    if damage == "flipped":
+        path.write_bytes(content)
+    make(family, receipt=receipt, cache=Path("looks.json"), **SMALL)
+    assert files(family / "shards") == before
+    assert faults(family, Path("work")) == {}
+    noted = receipts.read(receipt).outputs
+    assert {f"results/chairs/shards/{each}" for each in before} <= noted.keys()
+
+
+def test_a_shard_with_other_bytes_than_listed_is_written_again(grown):
+    before = shard_bytes(grown)
+    path = grown / "shards/train/chairs-train-00000.tar"
+    path.write_bytes(before[path.name][::-1])
+    make(grown, **SMALL)
+    assert shard_bytes(grown) == before
+
+
+def test_smaller_shards_move_views_to_the_end(grown):
+    before = keys(grown)
+    make(grown, **SMALL | {"shard_gigabytes": 1.7e-5})
+    assert sorted(keys(grown)) == sorted(before)
+    assert all(len(content) <= 2 * 10_240 for content in shard_bytes(grown).values())
+    assert faults(grown) == {}
+
+
 # ---- sums ------------------------------------------------------------------------------------
 
 
@@ -356,7 +558,7 @@ def test_the_sums_hold_and_cover_everything(built):
         for path in built.glob("*/*/sha256sums.txt")
         for line in path.read_text().splitlines()
     }
-    assert listed | beneath | {"sha256sums.txt"} == files(built).keys()
+    assert listed | beneath | {"sha256sums.txt", "report/members.jsonl"} == files(built).keys()
     assert faults(built) == {}
 
 
@@ -372,9 +574,10 @@ def test_every_fault_in_every_file_of_a_corpus_is_found(built, tmp_path, kind, f
 @pytest.mark.parametrize("fault", ["emptied", "cut short", "deleted", "a folder"])
 def test_the_status_of_a_family_leaves_out_members_with_damaged_records(built, tmp_path, fault):
     folder = shutil.copytree(built, tmp_path / "chairs")
-    assert status.of_family("chairs", folder, 7) == "chairs: 6 of 7 members built, 1 failed"
+    names = {member["name"] for member in read_json(folder / "corpus.json")["members"]}
+    assert status.of_family("chairs", folder, names) == "chairs: 6 of 7 members built, 1 failed"
     spoil(folder, "record of a member", fault)
-    assert status.of_family("chairs", folder, 7) == "chairs: 5 of 7 members built, 1 failed"
+    assert status.of_family("chairs", folder, names) == "chairs: 5 of 7 members built, 1 failed"
 
 
 def test_a_damaged_shard_and_a_foreign_one_are_found(built, tmp_path):
@@ -394,6 +597,22 @@ def test_a_dataset_that_the_sums_leave_out_is_found(built, tmp_path):
     assert faults(folder).keys() == {str(folder / "0002/plane/sha256sums.txt")}
     sums.unlink()
     assert faults(folder).keys() == {str(sums)}
+
+
+def test_what_a_corpus_no_longer_has_is_named_once(built, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    shutil.copytree(folder / "0001", folder / "0009")
+    shutil.copytree(folder / "0001/plane", folder / "0002/ring")
+    found = faults(folder)
+    assert found.keys() == {str(folder / "0009"), str(folder / "0002/ring")}
+    assert all("prune" in problem for problem in found.values())
+
+
+def test_the_whole_files_of_a_failed_member_are_no_fault(built, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    shutil.copytree(folder / "0001/plane", folder / "broken/plane")
+    (folder / "broken/plane/sha256sums.txt").unlink()
+    assert faults(folder) == {}
 
 
 def test_the_program_that_checks_every_byte_checks_a_corpus(built, run_program, tmp_path):
@@ -433,6 +652,15 @@ def test_mending_sets_aside_what_the_next_run_must_make_again(
 
 
 # ---- the page --------------------------------------------------------------------------------
+
+
+def test_a_corpus_has_the_licence_and_the_credit_of_its_scene(members, tmp_path):
+    folder = shutil.copytree(members, tmp_path / "chairs")
+    facts = {"description": "Old chairs", "licence": "CC-BY-4.0", "credit": "A. Joiner"}
+    assert make(folder, **facts).items() >= facts.items()
+    page = (folder / "index.html").read_text()
+    assert all(fact in page for fact in facts.values())
+    assert not make(folder).keys() & facts.keys()
 
 
 @pytest.mark.parametrize("width", accessibility.WIDTHS)

@@ -8,6 +8,7 @@ import re
 import resource
 import shutil
 import subprocess
+import time
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 from checkouts import checkout, snakemake
 from conftest import largest_file
+from pydantic import ValidationError
 
 from lightfield.configuration.family import Family, Member, drawn, member_content, stand_in
 from lightfield.configuration.scene_yaml import check_member
@@ -26,7 +28,7 @@ from lightfield.family import batch as family_batch
 from lightfield.family.batch import deadly_members, member_at_hand
 from lightfield.family.member import MemberBuild
 from lightfield.imaging.images import write_exr, write_png
-from lightfield.stages.family import BatchSettings, BuildMembers
+from lightfield.stages.family import BatchSettings, BuildMembers, Corpus, CorpusSettings
 from lightfield.stages.registry import VERSIONS
 from lightfield.stages.views import RenderShard
 from lightfield.validation.verification import faults
@@ -123,8 +125,46 @@ def test_models_get_names_that_stay_theirs(tmp_path, monkeypatch):
 
 def test_a_family_without_models_is_refused(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(UserError, match=r"family\.models: is 'models/\*\.glb'"):
-        family(models="models/*.glb").members()
+    Path("face.obj").touch()
+    for models in ("models/*.glb", ["*.obj", "models/*.glb"]):
+        with pytest.raises(UserError, match=r"family\.models: is 'models/\*\.glb'"):
+            family(models=models).members()
+    for models in ([], [""], "", 3, [["*.obj"]]):
+        with pytest.raises(ValidationError, match="models"):
+            family(models=models)
+
+
+def test_a_family_takes_models_of_several_paths(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for path in ("chairs/a.glb", "chairs/old/b.glb", "tables/c.obj", "tables/d.ply"):
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        Path(path).touch()
+    chairs = by_name(family(models="chairs/**/*.glb").members())
+    assert by_name(family(models=["chairs/**/*.glb"]).members()) == chairs
+    both = by_name(family(models=["chairs/**/*.glb", "tables/*.obj"]).members())
+    # A further path changes no member.
+    assert both == chairs | {"c_obj": Member(name="c_obj", model="tables/c.obj")}
+    assert len(chairs) == 2
+
+
+@pytest.mark.parametrize(
+    ("models", "said"),
+    [
+        (["a/*.glb", "a/**/*.glb"], "a/chair.glb matches 'a/*.glb' and 'a/**/*.glb'"),
+        (["a/*.glb", "./a/*.glb"], "./a/chair.glb matches 'a/*.glb' and './a/*.glb'"),
+        (["a/*.glb", "a/*.glb"], "a/chair.glb matches 'a/*.glb' and 'a/*.glb'"),
+        (["a/*.glb", "b/*.glb"], "a/chair.glb and b/chair.glb would both be the member chair_glb"),
+    ],
+)
+def test_a_file_or_name_of_two_members_is_refused(tmp_path, monkeypatch, models, said):
+    monkeypatch.chdir(tmp_path)
+    for path in ("a/chair.glb", "b/chair.glb"):
+        Path(path).parent.mkdir()
+        Path(path).touch()
+    with pytest.raises(UserError) as caught:
+        family(models=models).members()
+    assert str(caught.value).startswith(f"family.models: {said}")
+    assert len(family(models="*/*.glb").members()) == 2
 
 
 def test_a_new_seed_changes_one_batch_and_a_new_model_too(tmp_path, monkeypatch):
@@ -168,7 +208,9 @@ OF_MODELS = {"render": {"samples": 1}, "rigs": {"ring": {"type": "ring", "count"
 OF_MODELS["rigs"]["ring"]["camera"] = {"lens": "rectilinear", "fov": 50, "resolution": [8, 8]}
 
 
-@pytest.mark.parametrize("models", ["models/*.obj", "models/*.PLY", "models/**/*"])
+@pytest.mark.parametrize(
+    "models", ["models/*.obj", "models/*.PLY", "models/**/*", ["a/*.obj"], ["a/*.glb", "b/*.obj"]]
+)
 def test_a_family_of_models_takes_the_keys_of_its_format(models):
     scene = {"up": "z", "unit": "metres"}
     content = {"scene": scene, "family": {"models": models}, **OF_MODELS}
@@ -266,6 +308,18 @@ rigs:
     camera: {{lens: rectilinear, fov: 50, resolution: [8, 8]}}
 family: {{models: models/*.obj, values: {values}}}
 """
+
+
+@pytest.mark.slow
+def test_wrong_models_are_refused_in_one_line(tmp_path):
+    models = MODELS.replace("models/*.obj", '["*.obj", "none/*.obj"]')
+    folder = checkout(tmp_path / "plenoforge", faces=models.format(light="city", values="{}"))
+    (folder / "face.obj").write_text(FACE)
+    run = snakemake(folder, "--dry-run", "--config", "scenes=[faces]", "rigs=all")
+    assert run.returncode == 1
+    said = [line for line in run.stderr.splitlines() if not line.startswith("Using workflow")]
+    assert len(said) == 1
+    assert re.match(r"error: configs/scenes/faces\.yaml:\d+: family\.models: is 'none/", said[0])
 
 
 @pytest.mark.slow
@@ -525,6 +579,56 @@ def test_a_failed_member_keeps_what_its_links_lead_to(face, tmp_path):
     assert record["failure"]["cause"] == "out of memory"
     assert [path.name for path in build.folder.iterdir()] == ["member.json"]
     assert (tmp_path / "disk/mine.txt").read_text() == "mine"
+
+
+# ---- what members took -------------------------------------------------------------------------
+
+
+def listed_members(build):
+    """Collect the family of a member. Return the lines of its members by their names."""
+    settings = CorpusSettings(family="faces", inputs=[str(build.record)])
+    receipt = build.receipt.parents[1] / "corpus.jsonl"
+    Corpus(
+        settings=settings,
+        folder=build.folder.parent,
+        cache=build.work.parent / "looks.json",
+        receipt=receipt,
+    ).run()
+    lines = (build.folder.parent / "report/members.jsonl").read_text().splitlines()
+    return {row["name"]: row for row in map(json.loads, lines)}
+
+
+@pytest.mark.slow
+def test_the_list_of_members_has_what_the_last_build_of_each_took(face, tmp_path):
+    build = build_of(face())
+    began, cpu_began = time.time(), time.process_time()
+    build.build("cpu", 1)
+    seconds, cpu_seconds = time.time() - began, time.process_time() - cpu_began
+    row = listed_members(build)["face"]
+    assert 0 < row["seconds"] <= seconds + 0.001
+    assert row["seconds"] == pytest.approx(seconds, abs=0.5)
+    assert row["cpu_seconds"] == pytest.approx(cpu_seconds, abs=0.5)
+    assert began <= row["built"] <= time.time()
+    assert row["stage_cpu_seconds"].keys() >= {"import_model", "render_shard", "validate"}
+    assert sum(row["stage_cpu_seconds"].values()) <= row["cpu_seconds"] + 0.01
+
+    # A failed member has its cause, and the time until it failed.
+    (tmp_path / "face.obj").write_text("nothing")
+    build.build("cpu", 1)
+    failed = listed_members(build)["face"]
+    assert (failed["state"], failed["failed_stage"]) == ("failed", "import_model")
+    assert "face.obj" in failed["error"]
+    assert failed["built"] > row["built"]
+    assert failed["stage_cpu_seconds"].keys() == {"import_model"}
+
+    # Nobody knows what a process took that died.
+    build.note_death("killed by SIGSEGV")
+    died = listed_members(build)["face"]
+    assert (died["error"], died["seconds"], died["cpu_seconds"]) == (
+        "killed by SIGSEGV",
+        None,
+        None,
+    )
 
 
 # ---- batches, as a run finds them --------------------------------------------------------------

@@ -222,6 +222,36 @@ def test_kannala_brandt_is_opencvs_fisheye() -> None:
     assert angle(lens.rays(expected[:, 0, 0], expected[:, 0, 1]), rays).max() < 1e-12
 
 
+@pytest.mark.parametrize("name", [name for name in EXAMPLES if name.startswith("rectilinear")])
+def test_k_projects_in_opencv_to_the_lenss_pixels(name: str) -> None:
+    lens = EXAMPLES[name]
+    rays = lens.rays(*np.random.default_rng(6).uniform(0, (lens.width, lens.height), (100, 2)).T)
+    # OpenCV's cameras look along +Z with +Y down.
+    points = rays * [1, -1, -1] * 3
+    expected, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), lens.K, np.zeros(4))
+    np.testing.assert_allclose(lens.pixels(rays), expected[:, 0], atol=1e-9)
+
+
+def test_k_is_in_pixels_and_the_first_centre_is_at_a_half() -> None:
+    lens = from_camera({"lens": "rectilinear", "fov": 90, "resolution": [40, 30]})
+    np.testing.assert_allclose(lens.K, [[20, 0, 20], [0, 20, 15], [0, 0, 1]])
+    direction = np.linalg.inv(lens.K) @ (0.5, 0.5, 1)
+    ray = lens.pixel_rays()[0, 0] * [1, -1, -1]
+    np.testing.assert_allclose(direction / np.linalg.norm(direction), ray, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [name for name in EXAMPLES if "rectilinear" not in name])
+def test_other_lenses_have_no_k_and_say_what_to_use(name: str) -> None:
+    lens = EXAMPLES[name]
+    with pytest.raises(UserError) as raised:
+        lens.K  # noqa: B018
+    message = str(raised.value)
+    assert "\n" not in message
+    assert lens.title in message
+    assert "rays" in message
+    assert "perspective reprojection" in message
+
+
 @both
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_pixels_undo_rays_and_rays_undo_pixels_over_the_whole_frame(name: str, dtype: type) -> None:

@@ -87,6 +87,19 @@ EACH: dict[str, dict[str, Any]] = {
     "random": {"count": 8},
 }
 OF_FILES = {"poses", "blend_camera"}
+# The same rigs with more cameras.
+MORE: dict[str, dict[str, Any]] = {
+    "plane": {"cameras": [3, 3]},
+    "cuboid": {"cameras": [3, 2, 5]},
+    "cylinder": {"cameras": [5, 3]},
+    "sphere": {"subdivisions": 3},
+    "lattice": {"cameras": [2, 3, 2]},
+    "hemisphere": {"count": 15},
+    "ring": {"count": 13},
+    "spiral": {"count": 17},
+    "path": {"count": 14},
+    "random": {"count": 16},
+}
 
 # The addon's method by Blender's own means. This imports nothing of the project.
 BLENDER = r"""
@@ -713,3 +726,43 @@ def test_elevations_must_grow():
     np.testing.assert_allclose([pose.position[2] for pose in flat.poses()], 0.5)
     with pytest.raises(UserError, match="must have the smaller value first"):
         rigs.from_settings({"type": "spiral", "count": 5, "elevation": [50, 10]})
+
+
+def documented_to_keep_cameras():
+    """Return the types of rigs of which the reference says that more cameras keep the earlier."""
+    page = Path(__file__).parents[2] / "docs/reference/rigs.md"
+    rows = [
+        [cell.strip() for cell in line.strip("| \n").split(" | ")]
+        for line in page.read_text().splitlines()
+        if line.startswith("| `") and line.count(" | ") == 3
+    ]
+    return {row[0].strip("`"): row[-1].startswith("yes") for row in rows}
+
+
+def few_and_more(name, folder):
+    """Return a rig of a type, and the same rig with more cameras."""
+    if name == "blend_camera":
+        matrices = {str(n): np.eye(4).tolist() for n in range(1, 20)}
+        inventory = folder / "inventory.json"
+        inventory.write_text(json.dumps({"blend": {"frame": 1, "camera": {"matrices": matrices}}}))
+        frames = [{"first": 3, "last": last, "step": 2} for last in (9, 17)]
+        return [
+            from_settings({"type": name, "frames": each}).placed(inventory, 1) for each in frames
+        ]
+    if name == "poses":
+        lines = ["name,x,y,z,rx,ry,rz", *(f"cam{n},{n},{n * n},1,0,0,{n / 9}" for n in range(9))]
+        made = []
+        for count in (4, 9):
+            file = folder / f"{count}.csv"
+            file.write_text("\n".join(lines[: count + 1]) + "\n")
+            made.append(from_settings({"type": name, "file": str(file)}))
+        return made
+    few = {"type": name, **EACH[name]}
+    return [from_settings(few), from_settings(few | MORE[name])]
+
+
+@pytest.mark.parametrize("name", [*EACH, *sorted(OF_FILES)])
+def test_more_cameras_keep_the_earlier_ones_of_the_types_that_the_reference_names(name, tmp_path):
+    few, more = (rig.poses() for rig in few_and_more(name, tmp_path))
+    assert len(more) > len(few)
+    assert (more[: len(few)] == few) == documented_to_keep_cameras()[name]

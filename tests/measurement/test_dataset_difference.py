@@ -14,6 +14,9 @@ import tiny
 from skimage.metrics import peak_signal_noise_ratio
 
 from lightfield.core.names import ROOT
+from lightfield.formats.lightfield import LightField
+from lightfield.geometry import lenses
+from lightfield.measurement.dataset_facts import changed_poses
 
 VIEW = "exr/view_0003f.exr"
 PNG = "perspective/view_0002f.png"
@@ -306,6 +309,17 @@ def test_a_setting_without_effect_leaves_equal_pixels(variants, diff):
     assert status == 1
     assert lines[0].startswith("equal pixels; only scene.name, scene.parameters.detail, ")
     assert section(lines, "inputs")[0].startswith("fingerprint of the scene: ")
+
+
+@pytest.mark.parametrize("angle", [1e-5, 30.0, 90.0, 179.9])
+def test_a_turn_of_a_camera_is_told_in_degrees(angle):
+    lens = lenses.from_camera({"lens": "equidistant", "fov": 180, "resolution": [8, 8]})
+    rig = {"type": "lattice", "cameras": [1, 1, 1]}
+    original = LightField.from_rig(rig, lens)
+    turned = LightField.from_rig(rig | {"rotation": [0, angle, 0]}, lens)
+    ((distance, degrees),) = changed_poses(original, turned).values()
+    assert distance == 0
+    assert degrees == pytest.approx(angle, rel=1e-6)
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """The experiment behind all measurements of rendering: its renders and its comparisons."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -118,4 +120,85 @@ def test_without_strata_all_pixels_are_whole_views(renderer):
         "probes": [window.name for window in renderer.windows],
         "size": SIZE,
         "resolution": [2 * SIZE, SIZE],
+        "denoising": [],
     }
+
+
+class DenoisingTrials(SimulatedTrials):
+    """Simulated views of 512 × 256, whose denoiser takes longer for a pixel of a small window.
+
+    A sample of a megapixel takes 6 s. Denoising takes 10 s and 0.5 s more for each window's side:
+    18 s in windows of 64². The filter "fast" takes half the time.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self.lens = lenses.from_camera(CAMERA | {"resolution": [512, 256]})
+        views = [window.view for window in self.windows]
+        self.windows = [ViewWindow(view, 440, 30, SIZE, SIZE) for view in views]
+        self.timed = []
+
+    def render(self, window, seed, settings):
+        self.timed.append(window)
+        megapixels = window.width * window.height / 1e6
+        denoising = 10 + 8 * 64 / window.width
+        if settings.get("denoise_prefilter") == "fast":
+            denoising /= 2
+        if not settings.get("denoise"):
+            denoising = 0
+        # The first render of a process takes longer.
+        late = 0.1 if len(self.timed) == 1 else 0
+        seconds = (6 * settings["samples"] + denoising) * megapixels + late
+        colour = np.full((window.height, window.width, 3), LIGHT, np.float32)
+        return Trial(colour, None, settings["samples"], seconds, "CPU")
+
+    def experiment(self):
+        mask = np.ones((SIZE, SIZE), bool)
+        colour = np.full((SIZE, SIZE, 3), LIGHT, np.float32)
+        references = [make_reference([colour] * 2, None, mask) for _ in self.windows]
+        return Experiment(self, self.windows, references)
+
+
+def test_the_denoisers_time_is_measured_in_a_window_as_large_as_the_denoiser_likes():
+    """In a window of 256², denoising takes 12 s a megapixel. In the experiment's it takes 18."""
+    renderer = DenoisingTrials()
+    experiment = renderer.experiment()
+    plain = Method("plain", {"samples": 2})
+    denoised = Method("denoised", {"samples": 2, "denoise": True})
+    fast = Method("fast", {"samples": 4, "denoise": True, "denoise_prefilter": "fast"})
+    experiment.run([plain, denoised, fast], [1, 2])
+    seconds = {m.name: experiment.seconds(m) for m in (plain, denoised, fast)}
+    assert np.array(seconds["denoised"]) == pytest.approx(2 * 6 + 12)
+    assert np.array(seconds["fast"]) == pytest.approx(4 * 6 + 6)
+    assert seconds["plain"][1] == [pytest.approx(12)] * 2
+    large = {w for w in renderer.timed if w.width == w.height == 256}
+    assert {(w.x, w.y) for w in large} == {(256, 0)}
+    accurate, of_fast = experiment.described()["denoising"]
+    assert accurate["settings"] == {"denoise": True} and accurate["side"] == 256
+    assert (accurate["seconds"], accurate["in_windows"]) == pytest.approx((12, 18))
+    assert of_fast["settings"] == {"denoise": True, "denoise_prefilter": "fast"}
+    assert (of_fast["seconds"], of_fast["in_windows"]) == pytest.approx((6, 9))
+
+
+def test_a_large_window_that_was_slowed_leaves_no_time_below_zero():
+    class Slowed(DenoisingTrials):
+        def render(self, window, seed, settings):
+            trial = super().render(window, seed, settings)
+            is_large_and_plain = window.width > SIZE and not settings.get("denoise")
+            return replace(trial, seconds=trial.seconds * (9 if is_large_and_plain else 1))
+
+    experiment = Slowed().experiment()
+    denoised = Method("denoised", {"samples": 1, "denoise": True})
+    experiment.run([denoised], [1, 2])
+    assert np.array(experiment.seconds(denoised)).min() > 0
+
+
+def test_the_denoisers_time_stays_where_the_views_are_as_small_as_the_windows():
+    renderer = DenoisingTrials()
+    camera = {"lens": "rectilinear", "fov": 90, "resolution": [SIZE, SIZE]}
+    renderer.lens = lenses.from_camera(camera)
+    renderer.windows = [ViewWindow(window.view, 0, 0, SIZE, SIZE) for window in renderer.windows]
+    experiment = renderer.experiment()
+    denoised = Method("denoised", {"samples": 2, "denoise": True})
+    experiment.run([denoised], [1, 2])
+    assert experiment.seconds(denoised)[1] == [pytest.approx(2 * 6 + 18)] * 2

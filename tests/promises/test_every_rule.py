@@ -123,6 +123,7 @@ WITHOUT_OUTPUT = {
     "gpu_check",
     "synthesis",
     "plan",
+    "prune",
     "status",
     "verify",
 }

@@ -55,6 +55,7 @@ TARGETS = [
     "smoke",
     "package",
     "plan",
+    "prune",
     "status",
     "error_vs_time",
     "reprojection_benchmark",

@@ -207,6 +207,20 @@ def test_a_plan_counts_only_the_views_that_a_run_will_render(tiny_build):
     assert planned_views(tiny_build) == 6
 
 
+def test_more_cameras_of_a_random_rig_render_only_the_new_views(tmp_path):
+    folder = tiny.checked_out(tmp_path / "random")
+    plane = "    type: plane\n    cameras: [3, 2]\n"
+    tiny.edit(folder, plane, "    type: random\n    clearance: 0.1\n    count: 4\n")
+    tiny.build(folder)
+    first = (folder / tiny.VIEW).read_bytes()
+    tiny.edit(folder, "count: 4", "count: 12")
+    assert planned_views(folder) == 8
+    tiny.build(folder)
+    assert len(rendered(folder)) == 12 and set(rendered(folder).values()) == {1}
+    assert (folder / tiny.VIEW).read_bytes() == first
+    assert NOTHING in plan(folder)
+
+
 def test_a_run_that_leaves_the_page_of_all_datasets_out_does_not_name_it(tiny_build):
     handlers = tiny_build / "scripts/lightfield/workflow/handlers.py"
     # As if there were many datasets, of which only this page is named.
@@ -262,3 +276,20 @@ def test_a_plan_names_a_folder_that_is_a_link_to_itself(tiny_build, name):
     assert result.returncode == 1
     assert f"error: {DATASET}/{name}: cannot be written: " in result.stderr
     assert f"{name} is a link that leads nowhere" in result.stderr
+
+
+def test_a_dataset_that_a_run_changed_in_part_has_no_checksums(tiny_build):
+    dataset = tiny_build / "results" / tiny.NAME
+    sums = dataset / "sha256sums.txt"
+    tiny.build(tiny_build, "--until", "render")
+    assert sums.exists()
+    tiny.edit(tiny_build, "fov: 80", "fov: 70")
+    tiny.build(tiny_build, "-n")
+    assert sums.exists()
+    tiny.build(tiny_build, "--until", "reproject")
+    assert not sums.exists()
+    status = tiny.build(tiny_build, "--", "status")
+    assert "validated: not since its files changed" in status
+    tiny.build(tiny_build)
+    subprocess.run(["sha256sum", "-c", "--quiet", sums.name], cwd=dataset, check=True)
+    assert "validated: yes" in tiny.build(tiny_build, "--", "status")

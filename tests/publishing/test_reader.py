@@ -21,7 +21,7 @@ from lightfield.imaging import images
 from lightfield.imaging.primaries import ACESCG, from_rec_709
 from lightfield.publishing import package
 from lightfield.publishing.publish import publish
-from lightfield.publishing.read import PlainLens
+from lightfield.publishing.read import PlainLens, open_views
 
 READER = ROOT / "scripts/lightfield/publishing/read.py"
 
@@ -105,12 +105,14 @@ def test_it_reads_what_the_library_reads(form, tmp_path):
     folder = form(write_dataset(tmp_path / "dataset"), tmp_path)
     data = open_dataset(folder)
     compared = compare(read(folder, data.reprojections), data)
-    own = {"/rgb", "/depth", "/z", "/distance", "/normal"}
+    # Opaque views have an alpha of 1.
+    assert (data.views[0].alpha == 1).all()
+    own = {"/rgb", "/alpha", "/depth", "/z", "/distance", "/normal"}
     assert compared == {*own, *(f"panorama{array}" for array in own), *FACES}
 
 
 # The faces of a cube map have no passes, and their depth is "z". Perspective is PNG.
-FACES = {f"faces/{array}" for array in ("rgb", "depth", "z", "distance")}
+FACES = {f"faces/{array}" for array in ("rgb", "alpha", "depth", "z", "distance")}
 
 
 @pytest.mark.parametrize("form", [unpacked, shards])
@@ -140,7 +142,8 @@ def test_it_reads_alpha_other_primaries_and_a_camera_without_depth(form, tmp_pat
     folder = form(finish(dataset), tmp_path)
     data = open_dataset(folder)
     compared = compare(read(folder, data.reprojections), data)
-    assert compared == {"/rgb", "/alpha", "/depth", "/z", "/distance", "aces/rgb"}
+    own = {"/rgb", "/alpha", "/depth", "/z", "/distance"}
+    assert compared == {*own, "aces/rgb", "aces/alpha"}
 
 
 @pytest.mark.parametrize("form", [unpacked, shards])
@@ -166,6 +169,24 @@ def test_it_has_no_rays_for_omnidirectional_stereo(tmp_path):
     origins, _ = arrays["/rays"]
     assert np.isnan(origins).all()
     assert not arrays["/visible"].any()
+
+
+@pytest.mark.parametrize("form", [unpacked, shards])
+def test_an_unknown_reprojection_is_named_with_what_there_is(form, tmp_path):
+    folder = form(write_dataset(tmp_path / "dataset"), tmp_path)
+    with pytest.raises(ValueError, match=r"no views 'perspectiv'.*'faces', .*'perspective'"):
+        open_views("perspectiv", folder)
+
+
+def test_missing_shards_are_named(tmp_path):
+    folder = shards(write_dataset(tmp_path / "dataset"), tmp_path)
+    missing = folder / "room_rig-train-00001.tar"
+    missing.unlink()
+    with pytest.raises(FileNotFoundError, match=re.escape(str(missing))):
+        open_views(folder=folder)
+    # Without the list, as in a family, what is there is read.
+    (folder / "sha256sums.txt").unlink()
+    assert 0 < len(open_views(folder=folder)) < 6
 
 
 def test_all_packages_and_shards_have_the_same_file(tmp_path):

@@ -1,5 +1,6 @@
 """The part of the library that `pip install` installs reads datasets without the rest."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -9,6 +10,8 @@ from pathlib import Path
 import pytest
 from checkouts import ROOT
 from conftest import SCRIPTS
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 from sphere import LENSES, write_views
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -80,8 +83,34 @@ def test_the_installed_packages_read_a_dataset_with_their_dependencies_alone(ins
     of_pydantic = {"pydantic_core", "annotated_types", "typing_inspection"}
     others = names - set(sys.stdlib_module_names) - {"lightfield"} - dependencies - of_pydantic
     assert not others
-    named = {each.partition(">")[0] for each in PROJECT["project"]["dependencies"]}
-    assert named | {"Imath"} == dependencies
+    assert DEPENDENCIES.keys() | {"imath"} == {canonicalize_name(name) for name in dependencies}
+
+
+def requirements(lines):
+    """Return the requirements in lines by their packages' names, without comments and options."""
+    texts = (line.partition("#")[0].strip() for line in lines)
+    each = [Requirement(text) for text in texts if text and not text.startswith("-")]
+    return {canonicalize_name(requirement.name): requirement for requirement in each}
+
+
+DEPENDENCIES = requirements(PROJECT["project"]["dependencies"])
+LOCKS = [ROOT / f"envs/requirements-{version}.txt" for version in ("3.11", "3.13")]
+
+
+@pytest.mark.parametrize("lock", LOCKS, ids=lambda lock: lock.stem)
+def test_the_installed_reader_takes_the_versions_of_the_environment(lock):
+    lines = re.findall(r"^\S+==[^\s\\;]+", lock.read_text(), re.M)
+    locked = requirements(lines)
+    for name, requirement in DEPENDENCIES.items():
+        (version,) = (each.version for each in locked[name].specifier)
+        assert version in requirement.specifier, name
+
+
+@pytest.mark.parametrize("name", ["openimageio", "openexr", "pydantic"])
+def test_the_installed_reader_takes_no_version_that_the_environment_would_not(name):
+    """Another OpenImageIO may read damaged files that this one refuses."""
+    lines = (ROOT / "envs/requirements.in").read_text().splitlines()
+    assert DEPENDENCIES[name].specifier == requirements(lines)[name].specifier
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ import families
 import numpy as np
 import pytest
 from checkouts import ROOT
-from sphere import LENSES, RADIUS, colour_of, write_views
+from sphere import LENSES, RADIUS, colour_of, make_transparent, write_views
 
 from lightfield import open_corpus, open_dataset
 from lightfield.configuration.publication import Credits
@@ -281,6 +281,22 @@ def test_a_picture_is_read_as_it_was_encoded(folder):
     np.testing.assert_allclose(view.rgb, colour_of(points) / 255, atol=3e-3)
 
 
+@pytest.mark.parametrize("form", ["folder", "package", "shards"])
+def test_the_alpha_of_an_opaque_view_is_1(form, forms):
+    """Neither its EXRs nor the PNGs of the cube map's faces have a channel A."""
+    data = open_dataset(forms[form])
+    faces = replace(data.reprojections["faces"], suffix=".png")
+    for view, size in ((data.views[0], (16, 24)), (faces.views[0], (8, 8))):
+        assert (view.alpha.dtype, view.alpha.shape) == (np.float32, size)
+        assert (view.alpha == 1).all()
+
+
+def test_the_alpha_of_a_transparent_view_is_its_files(tmp_path):
+    write_views(tmp_path / "dataset", CAMERA, RIG)
+    make_transparent(tmp_path / "dataset", 0.25)
+    assert (open_dataset(tmp_path / "dataset").views[0].alpha == 0.25).all()
+
+
 def test_a_dataset_of_silvrs_tools_is_read(tmp_path):
     write_views(tmp_path / "dataset", CAMERA, RIG)
     file = tmp_path / "dataset/lightfield.json"
@@ -436,6 +452,24 @@ def cut(path, beyond):
     return path
 
 
+def removed(folder, *names):
+    """Remove files from a folder. Returns the folder."""
+    for name in names:
+        (folder / name).unlink()
+    return folder
+
+
+def damaged(path):
+    path.write_bytes(b"\xff\xfe")
+    return path
+
+
+def further_parts(home):
+    """Return the names of the package's parts after the first, in their order."""
+    names = [path.name for path in home.glob("parts/room_rig.*.tar")]
+    return sorted(names, key=lambda name: int(name.split(".")[1]))
+
+
 # What is opened, and what the message names beside it.
 MISTAKES = {
     "no path": (lambda home: home / "missing", "is not there"),
@@ -447,7 +481,53 @@ MISTAKES = {
     "compressed": (lambda home: home / "zipped.tar", "whole, uncompressed tar"),
     "cut in a file": (lambda home: cut(home / "room_rig.tar", 600), "tar"),
     "cut between files": (lambda home: cut(home / "room_rig.tar", 0), "cut short"),
-    "missing shard": (lambda home: home / "shards/room_rig-train-{00000..00099}.tar", "-000"),
+    "shards beyond the last": (
+        lambda home: home / "shards/room_rig-train-{00000..00099}.tar",
+        "room_rig-train-00098.tar, room_rig-train-00099.tar",
+    ),
+    "missing shard": (
+        lambda home: removed(home / "shards", "room_rig-train-00001.tar"),
+        "misses room_rig-train-00001.tar",
+    ),
+    "missing part of the split": (
+        lambda home: removed(home / "shards", "room_rig-test-00000.tar"),
+        "misses room_rig-test-00000.tar",
+    ),
+    "missing shard, without a list": (
+        lambda home: removed(home / "shards", "room_rig-train-00001.tar", "sha256sums.txt"),
+        "misses room_rig-train-00001.tar",
+    ),
+    "missing shard of a run": (
+        lambda home: (
+            removed(home / "shards", "room_rig-train-00001.tar")
+            / "room_rig-train-{00000..00002}.tar"
+        ),
+        "misses room_rig-train-00001.tar",
+    ),
+    "damaged sums of shards": (
+        lambda home: damaged(home / "shards/sha256sums.txt").parent,
+        "sha256sums.txt: is not a valid list of checksums",
+    ),
+    "missing part of a package": (
+        lambda home: removed(home / "parts", "room_rig.2.tar") / "room_rig.tar",
+        "misses room_rig.2.tar",
+    ),
+    "missing parts at the end of a package": (
+        lambda home: removed(home / "parts", *further_parts(home)) / "room_rig.tar",
+        "misses 1 file, such as sha256sums.txt; copy all parts",
+    ),
+    "missing last part of a package": (
+        lambda home: removed(home / "parts", further_parts(home)[-1]) / "room_rig.tar",
+        "misses 1 file, such as sha256sums.txt; copy all parts",
+    ),
+    "missing first part of a package": (
+        lambda home: removed(home / "parts", "room_rig.tar") / further_parts(home)[4],
+        "open the first .tar of the package, room_rig.tar",
+    ),
+    "further part with a lightfield.json": (
+        lambda home: home / "parts" / further_parts(home)[3],
+        "open the first .tar of the package, room_rig.tar",
+    ),
     "broken lightfield.json": (lambda home: home / "broken", "lightfield.json"),
 }
 
@@ -481,6 +561,45 @@ def test_a_missing_pass_and_a_wrong_part_name_what_there_is(folder):
         data.split("val")
     with pytest.raises(UserError, match=r"view_0099f.* view_0000f to view_0005f"):
         data.views["view_0099f"]
+    with pytest.raises(UserError, match=r"no 'albedo'; it has normal, object, flow"):
+        data.names("albedo")
+    with pytest.raises(UserError, match=r"'albedoo'; there are normal, .*albedo, .* flow"):
+        data.views[0].pass_path("albedoo")
+    with pytest.raises(UserError, match=r"'depth'; must be z or distance"):
+        data.views[0].depth_as("depth")
+
+
+@pytest.mark.parametrize("form", ["folder", "package", "shards"])
+def test_an_unknown_reprojection_is_one_line_that_names_what_there_is(form, forms):
+    data = open_dataset(forms[form])
+    with pytest.raises(UserError) as raised:
+        data.reprojections["perspectiv"]
+    message = str(raised.value)
+    assert message.startswith(f"{forms[form]}: ")
+    assert message.endswith(": has no 'perspectiv'; it has faces, panorama, perspective")
+    assert "perspectiv" not in data.reprojections
+    assert data.reprojections.get("perspectiv") is None
+    # A loader sends the dataset to its processes with what was looked up.
+    copied = pickle.loads(pickle.dumps(data)).reprojections
+    assert list(copied) == ["faces", "panorama", "perspective"]
+    with pytest.raises(UserError, match=re.escape(message)):
+        copied["perspectiv"]
+
+
+def test_without_reprojections_the_message_says_none(folder):
+    panorama = open_dataset(folder).reprojections["panorama"]
+    with pytest.raises(UserError, match=r"has no 'perspective'; it has none"):
+        panorama.reprojections["perspective"]
+
+
+def test_a_number_beyond_the_views_names_the_numbers(folder):
+    views = open_dataset(folder).views
+    for number in (6, -7):
+        with pytest.raises(IndexError, match=rf"^{number}: .* 6 views; they are 0 to 5$"):
+            views[number]
+    # What Python does with a sequence goes on.
+    assert next(reversed(views)).name == "view_0005f"
+    assert views.index(views[2]) == 2
 
 
 def test_a_damaged_view_in_a_tar_is_named_by_its_place(forms, tmp_path):

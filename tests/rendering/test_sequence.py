@@ -90,6 +90,9 @@ def test_every_stage_is_planned_for_every_frame(tmp_path):
         assert jobs[name] == 4
     # One archive has all frames of a sequence.
     assert jobs["pack"] == 2
+    jobs = planned(folder, "--config", "scenes=[moving]", "rigs=all", "preset=full")
+    # One page has all frames, and each frame has a page.
+    assert (jobs["page"], jobs["sequence_page"]) == (4, 1)
 
 
 @pytest.mark.slow
@@ -158,6 +161,14 @@ def test_all_frames_go_into_one_export_of_the_sequence(tmp_path):
     assert damaged.stat().st_size > 0
     plan = snakemake(folder, "-n", *arguments)
     assert "Nothing to be done" in plan.stdout + plan.stderr
+    result = snakemake(folder, "--cores", "2", "report_html", *arguments[1:])
+    assert result.returncode == 0, result.stdout + result.stderr
+    # A build shows the page of all frames, which is no file of their exports.
+    assert "valid: results/moving/LFPair/report/sequence.html" in result.stderr.splitlines()
+    page = (rig / "report/sequence.html").read_text()
+    assert all(f"../{name}/report/index.html" in page for name in ("f00002", "f00003"))
+    checked = snakemake(folder, "verify", "--config", "scenes=[moving]", "rigs=all", "preset=full")
+    assert checked.returncode == 0, checked.stdout + checked.stderr
 
 
 # Without the map of the sky by which Cycles sends its rays to bright parts. It would take most of

@@ -467,6 +467,8 @@ def test_another_frame_of_a_sequence_keeps_the_eyes_place(small, show, tmp_path)
         make_page(folder, rig, f"ball/{name}", folder / "report/index.html")
     opened = show(tmp_path / "ball/f00001/report/index.html")
     wait(opened)
+    link = opened.get_by_role("link", name="Sequence")
+    assert link.get_attribute("href") == "../../report/sequence.html"
     slider = opened.locator("#walk-frame")
     assert [slider.get_attribute(key) for key in ("max", "value")] == ["2", "0"]
     opened.locator("#walk-depth").click()

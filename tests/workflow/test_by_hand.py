@@ -116,6 +116,7 @@ def test_energy_settings_and_full_size_are_checked(refused, tmp_path, content, p
 
 
 PAGE = ["--dataset", ".", "--name", "a/b", "--output", "made.html"]
+FRAMES = ["--rig", ".", *PAGE[2:]]
 CAPTURE = {"scene": "a", "source": {"builder": "room"}, "render": {}, "rig": RIG}
 PACK = ["--folder", ".", "--output", "../made.tar"]
 PUBLISH = ["--folder", ".", "--output", "../made"]
@@ -129,6 +130,7 @@ GPU = ["--blend", "a", "--inventory", "b", "--lightfield", "c", "--cache", "d", 
         ("make_lightfield.py", PAGE[-2:], CAPTURE | {"rig": {"type": "x"}}, "rig.type: is"),
         ("make_lightfield.py", PAGE[-2:], CAPTURE | {"source": {"frame": 1}}, "source: must"),
         ("report_html.py", PAGE, {"rig": RIG, "yaml": ""}, "is missing the key command"),
+        ("report_sequence.py", FRAMES, {"rig": RIG, "frames": []}, "frames: is []; must"),
         ("package.py", PACK, {"gigabytes": 0}, "gigabytes: is 0; must be a number above 0"),
         ("package.py", PACK, {"scene": {"licence": 1}}, "scene.licence: is 1; must be a text"),
         ("publish.py", PUBLISH, {"scene": {"publish": {}}}, "scene.publish.licence: is missing"),

@@ -21,6 +21,14 @@ from lightfield.geometry import lenses
 from lightfield.stages.checks import Status
 
 NAMES = ["a", "b", "c", "d"]
+# A scene YAML of five members.
+CAMERA = {"lens": "equidistant", "fov": 180, "resolution": [8, 8]}
+FAMILY = {
+    "scene": {"builder": "room"},
+    "render": {"samples": 1},
+    "rigs": {"plane": {"type": "plane", "cameras": [2, 1], "size": 1, "camera": CAMERA}},
+    "family": {"seeds": "0-4"},
+}
 
 
 @pytest.fixture
@@ -167,6 +175,8 @@ def test_a_validation_counts_only_for_the_present_views(dataset):
     dataset.render(*NAMES)
     file = dataset.folder / "validation.json"
     file.write_text('{"valid": true}')
+    assert "  validated: not since its files changed" in dataset()
+    (dataset.folder / "sha256sums.txt").write_text("")
     assert "  validated: yes" in dataset()
     os.utime(file, (1, 1))
     assert "  validated: not since its views were made" in dataset()
@@ -243,14 +253,18 @@ def test_progress_works_while_nothing_is_finished(capsys, monkeypatch):
     ]
 
 
-def test_a_familys_members_are_counted_by_their_state(tmp_path, capsys):
+def test_a_familys_members_are_counted_by_their_state(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     failure = {"stage": "import_model", "cause": "it is empty", "log": "work/chairs/b/member.log"}
-    states = {"a": {"state": "valid"}, "b": {"state": "failed", "failure": failure}}
+    states = {"0000": {"state": "valid"}, "0001": {"state": "failed", "failure": failure}}
+    # The family no longer has this one.
+    states["0005"] = {"state": "valid"}
+    files.write_json(tmp_path / "configs/scenes/chairs.yaml", FAMILY)
     for name, state in states.items():
         record = {"format": "plenoforge member", "name": name, "key": "0" * 64, "values": {}}
-        record |= {"model": f"models/{name}.glb", "datasets": {}, **state}
-        (tmp_path / "chairs" / name).mkdir(parents=True)
-        files.write_json(tmp_path / "chairs" / name / "member.json", record)
+        record |= {"seed": int(name), "datasets": {}, **state}
+        (tmp_path / "chairs_tiny" / name).mkdir(parents=True)
+        files.write_json(tmp_path / "chairs_tiny" / name / "member.json", record)
     folders = ("--results", str(tmp_path), "--work", str(tmp_path))
-    parsed(Status, None, [*folders, "--family", "chairs", "5"]).run()
-    assert capsys.readouterr().out == "chairs: 1 of 5 members built, 1 failed\n"
+    parsed(Status, None, [*folders, "--family", "chairs_tiny", "chairs"]).run()
+    assert capsys.readouterr().out == "chairs_tiny: 1 of 5 members built, 1 failed\n"

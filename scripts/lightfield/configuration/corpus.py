@@ -9,8 +9,10 @@ from lightfield.core.names import CORPUS, Part
 from lightfield.settings.base import Settings
 
 PAGE = "index.html"
+# The list of members with their times and errors.
+MEMBERS = "report/members.jsonl"
 # The files of a corpus that every family has.
-CORPUS_FILES = (CORPUS, PAGE, "sha256sums.txt")
+CORPUS_FILES = (CORPUS, PAGE, MEMBERS, "sha256sums.txt")
 # A corpus has these folders beside its members' folders. No member may have such a name.
 THUMBNAILS = "thumbnails"
 SHARDS = "shards"

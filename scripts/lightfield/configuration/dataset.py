@@ -220,6 +220,11 @@ class Dataset(Capture):
         """The checksums of the exports of the whole sequence, if it has any."""
         return self.sequence_paths.sums if self.sequence_exports else None
 
+    @property
+    def sequence_page(self) -> str | None:
+        """The page of the whole sequence, if this is a frame of one."""
+        return self.sequence_paths.sequence_page if self.rig.sequence else None
+
     def training_list(self, export: Export, source: str) -> str | None:
         """Return the list of the ``export`` of the views that train what this dataset tests.
 
@@ -259,8 +264,14 @@ class Dataset(Capture):
         """The receipts of all shards."""
         return [file for folder in self.shard_folders for file in self.receipts(folder)]
 
-    def testing_rigs(self, export: Export) -> tuple[str, ...]:
-        """Return the folders of the rigs whose views go into an ``export``, to test with."""
+    def rigs_beside(self, export: Export) -> tuple[str, ...]:
+        """Return the folders of the other rigs whose views go into an ``export`` of this one.
+
+        They test, unless the export has several rigs together.
+        """
+        if export.joined_rigs:
+            frame_folder = self.rig_folder.removeprefix(self.rig_name)
+            return tuple(f"{rig}{frame_folder}" for rig in export.joined_rigs[1:])
         return self.tested_by if export.is_for_training else ()
 
     def lens_maps(self, name: str) -> list[str]:
@@ -331,6 +342,7 @@ class Dataset(Capture):
             *paths.pictures,
             paths.costs,
             paths.page,
+            *_present(self.sequence_page),
             *self.all_receipts,
         ]
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
-from lightfield.core.names import MESH, SPLITS, VIEWS
+from lightfield.core.names import MESH, SEQUENCE_PAGE, SPLITS, VIEWS
 from lightfield.engine.receipts import FOLDER, SUFFIX
 from lightfield.exporters import list_path
 from lightfield.formats.export_lists import MANIFEST
@@ -206,6 +206,11 @@ class Paths:
         return f"{self.folder}/report/index.html"
 
     # Files of a rig with all frames of a sequence.
+
+    @property
+    def sequence_page(self) -> str:
+        """The page that shows all frames of a sequence."""
+        return f"{self.folder}/report/{SEQUENCE_PAGE}"
 
     @property
     def package(self) -> str:

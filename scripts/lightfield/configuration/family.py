@@ -12,9 +12,9 @@ import json
 import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -28,8 +28,11 @@ from lightfield.settings.base import Settings, as_list, pattern
 _MOST_MEMBERS = 100_000
 # The record of a member, in its folder.
 RECORD = "member.json"
+# The name of its receipt, without a suffix.
+RECEIPT = "member"
 FORMAT = "plenoforge member"
 
+_Glob = Annotated[str, Field(min_length=1, max_length=1000)]
 _Bounds = Annotated[tuple[float, float], as_list(2)]
 
 
@@ -99,12 +102,11 @@ class Family(Settings):
         "it as its seed, and also as its place, unless scene.parameters.place is given. Your own "
         "builder gets only the seed.",
     )
-    models: str | None = Field(
+    models: _Glob | Annotated[list[_Glob], Field(min_length=1)] | None = Field(
         None,
-        min_length=1,
-        max_length=1000,
         description="Model files, each of which makes a member: a path with * and **, such as "
-        "models/**/*.glb, relative to the folder in which Snakemake runs. Leave out scene.model.",
+        "models/**/*.glb, or a list of such paths. They are relative to the folder in which "
+        "Snakemake runs. Leave out scene.model.",
     )
     values: dict[str, Draw] = Field(
         {},
@@ -147,24 +149,31 @@ class Family(Settings):
     @property
     def example_model(self) -> str:
         """The name of a model file that may match. Of several formats, OBJ takes the most keys."""
-        assert self.models
-        suffix = Path(self.models).suffix.lower()
+        suffixes = {Path(each).suffix.lower() for each in self._globs}
+        suffix = suffixes.pop() if len(suffixes) == 1 else ""
         return f"model{suffix if suffix in MODELS else '.obj'}"
 
+    @property
+    def _globs(self) -> list[str]:
+        assert self.models
+        return [self.models] if isinstance(self.models, str) else self.models
+
     def members(self) -> list[Member]:
-        """Return all members. Raises `UserError` if no model matches, or too many do."""
+        """Return all members.
+
+        Raises `UserError` if a path of models matches no file, if there are too many files, or if
+        several paths match one file or make members of one name.
+        """
         if self.seeds:
             return [Member.of(name=f"{seed:04d}", seed=seed) for seed in self._seeds]
-        assert self.models
-        paths = _models(self.models)
-        if not paths:
-            raise UserError(f"family.models: is {self.models!r}; there is no such model file")
-        if len(paths) > _MOST_MEMBERS:
+        models = [*itertools.chain.from_iterable(map(_models, self._globs))]
+        if len(models) > _MOST_MEMBERS:
             raise UserError(
-                f"family.models: {self.models!r} has {len(paths)} files; "
+                f"family.models: {self.models!r} has {len(models)} files; "
                 f"must be at most {_MOST_MEMBERS}"
             )
-        return [Member.of(name=name, model=path) for name, path in paths.items()]
+        _check_once(models)
+        return [Member.of(name=each.name, model=each.path) for each in models]
 
     def batches(self) -> dict[str, list[Member]]:
         """Return the members that each job builds, by the batch's name.
@@ -244,17 +253,48 @@ def _part(*names: str) -> float:
     return evenly_spread(json.dumps(names))
 
 
-def _models(glob_pattern: str) -> dict[str, str]:
-    """Return the paths of the model files that match, by the names of their members."""
+class _Model(NamedTuple):
+    """A model file, the path with * that it matches, and the name of its member."""
+
+    path: str
+    glob: str
+    name: str
+
+
+def _models(glob_pattern: str) -> list[_Model]:
+    """Return the model files that match. Raises `UserError` if there is none."""
     folders = Path(glob_pattern).parent.parts
     fixed = list(itertools.takewhile(lambda part: not glob.has_magic(part), folders))
     # Path.glob() takes no path from /.
     paths = sorted(glob.glob(glob_pattern, recursive=True))  # noqa: PTH207
-    return {
-        _member_name(os.path.relpath(path, Path(*fixed))): path
+    models = [
+        _Model(path, glob_pattern, _member_name(os.path.relpath(path, Path(*fixed))))
         for path in paths
         if path.lower().endswith(MODELS) and os.path.isfile(path)  # noqa: PTH113, many files
-    }
+    ]
+    if not models:
+        raise UserError(f"family.models: is {glob_pattern!r}; there is no such model file")
+    return models
+
+
+def _check_once(models: Iterable[_Model]) -> None:
+    """Raise `UserError` for a file that several paths match, and for two members of one name."""
+    by_file: dict[str, _Model] = {}
+    by_name: dict[str, _Model] = {}
+    for model in models:
+        other = by_file.setdefault(os.path.normpath(model.path), model)
+        if other is not model:
+            raise UserError(
+                f"family.models: {model.path} matches {other.glob!r} and {model.glob!r}; must "
+                "match one of them alone"
+            )
+        other = by_name.setdefault(model.name, model)
+        if other is not model:
+            raise UserError(
+                f"family.models: {other.path} and {model.path} would both be the member "
+                f"{model.name}; rename one, or give one path with * for both, which keeps their "
+                "folders in the names"
+            )
 
 
 def _member_name(path: str) -> str:

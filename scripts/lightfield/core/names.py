@@ -16,6 +16,9 @@ SPLITS = "splits.json"
 Part = Literal["train", "validation", "test"]
 PARTS: tuple[Part, ...] = get_args(Part)
 
+# The page of a whole sequence, in a report's folder beside the frames.
+SEQUENCE_PAGE = "sequence.html"
+
 # The file of a package, and of a published dataset, that reads it without Plenoforge.
 READER = "read.py"
 

@@ -27,8 +27,8 @@ Bools = NDArray[np.bool_]
 class SourceDataset:
     """The rendered views of a dataset (``name`` ""), or the views of one of its reprojections.
 
-    - ``beside``: the datasets of other rigs, by the rigs' names. Their views become test views,
-      whose names begin with the rig's name: spiral_view_0000f.
+    - ``beside``: the datasets of other rigs, by the rigs' names. Names of their views begin with
+      the rig's name: spiral_view_0000f. Each view keeps its part of the split.
     - ``renamed``: if there are any, only these views in this order: new names and the views'.
     - ``exposure``, ``reinhard``: how EXR views are developed: stops, and the value that becomes
       white. ``reinhard`` 1 leaves light as it is. PNG views are used as they are.
@@ -85,7 +85,13 @@ class SourceDataset:
                 raise UserError(
                     f"{other.lightfield.path}: camera: must be the same as in {own.lightfield.path}"
                 )
-            views |= {f"{rig}_{view.name}": view for view in other.views}
+            named = {f"{rig}_{view.name}": view for view in other.views}
+            if taken := views.keys() & named.keys():
+                raise UserError(
+                    f"{other.lightfield.path}: frames: another rig of the export has the name "
+                    f"{min(taken)}, too; give the rig or its views another name"
+                )
+            views |= named
         cameras = [replace(view.camera, name=key) for key, view in views.items()]
         return own.lightfield.changed(views=cameras), views
 

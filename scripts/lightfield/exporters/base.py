@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.core.names import PARTS, VIEWS
 from lightfield.engine.stage import cause
@@ -24,7 +24,7 @@ from lightfield.geometry.rigs import BlendCamera, Rig
 from lightfield.imaging import blender_looks
 from lightfield.imaging.blender_looks import LookName
 from lightfield.settings.base import ReaderSettings, Settings
-from lightfield.settings.types import REINHARD, Stops, White
+from lightfield.settings.types import REINHARD, Stops, White, unique_names
 
 EXPORTERS: dict[str, "type[Export]"] = {}
 """All exporters by their names."""
@@ -82,6 +82,16 @@ class Export(Settings, ABC):
         exclude=True,
         description="Rigs whose views are exported. Without this key, all rigs.",
     )
+
+    @property
+    def joined_rigs(self) -> list[str]:
+        """The rigs whose views go into one export together, in the first one's folder, if any."""
+        return []
+
+    @property
+    def chosen_rigs(self) -> list[str] | None:
+        """The rigs whose views are exported, alone or together. None for all rigs."""
+        return self.joined_rigs or self.rigs
 
     @property
     def joins_split(self) -> bool:
@@ -154,6 +164,31 @@ class Developed(Export):
         return {key: value for key, value in super().recorded.items() if key != "look"}
 
 
+class ForTraining(Developed):
+    """Exports to train with, which may have the views of several rigs."""
+
+    is_for_training = True
+
+    # Settings name the folders of these rigs, so this changes no file of an export either.
+    together: Annotated[list[str], AfterValidator(unique_names)] | None = Field(
+        None,
+        min_length=2,
+        exclude=True,
+        description="In place of rigs: rigs whose views go into one export, in the folder of the "
+        "first. Names of the other rigs' views begin with the name of their rig.",
+    )
+
+    @model_validator(mode="after")
+    def _alone_or_together(self) -> Self:
+        if self.rigs and self.together:
+            raise ValueError("must have rigs or together, not both")
+        return self
+
+    @property
+    def joined_rigs(self) -> list[str]:
+        return self.together or []
+
+
 def angle(lens: Equidistant | KannalaBrandt) -> str:
     return f"sees {math.degrees(lens.fov):g} degrees"
 
@@ -186,8 +221,8 @@ class ExportSettings(ReaderSettings, Generic[Options]):
     suffix: Literal[".png", ".exr"] = Field(".exr", description="Suffix of the source's images.")
     tested_by: dict[str, str] = Field(
         {},
-        description="Datasets whose views are the test views of this export: their folders, by the "
-        "names of their rigs.",
+        description="Datasets whose views go into this export, too, to test or to train: their "
+        "folders, by the names of their rigs.",
     )
     frames: list[str] | None = Field(
         None,

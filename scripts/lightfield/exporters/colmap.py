@@ -35,7 +35,7 @@ from lightfield.export.points import (
 )
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, Developed, PointCount, angle
+from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ForTraining, PointCount, angle
 from lightfield.formats.lightfield import View
 from lightfield.geometry.colmap import pose
 from lightfield.geometry.lenses import Lens
@@ -54,7 +54,7 @@ EQUIRECTANGULAR = (17, "EQUIRECTANGULAR")
 TESTS = "test.txt"
 
 
-class ColmapModel(Developed):
+class ColmapModel(ForTraining):
     """The options of exports that are COLMAP models."""
 
     format: Literal["binary", "text"] = Field("binary", description="Form of COLMAP's files.")
@@ -106,7 +106,6 @@ class Colmap(ColmapModel):
     summary = "COLMAP model for gsplat, 3DGRUT, Brush and the original 3D Gaussian splatting."
     rank = 2
     loader = "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')"
-    is_for_training = True
     needs_surfaces = True
 
     def export(self, source: SourceDataset, folder: Path) -> None:

@@ -21,7 +21,6 @@ class ColmapFrames(ColmapModel):
     summary = "Sequence for SpacetimeGaussians: a COLMAP model for each frame."
     rank = 14
     loader = "python train.py -s {}/colmap_0 --loader colmap  # SpacetimeGaussians"
-    is_for_training = True
     is_of_sequence = True
     needs_surfaces = True
 

@@ -20,7 +20,7 @@ from lightfield.export import cameras
 from lightfield.export.points import lift, write_ply
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import Developed, PointCount, centred_pinhole
+from lightfield.exporters.base import ForTraining, PointCount, centred_pinhole
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
@@ -28,14 +28,13 @@ from lightfield.imaging import images
 POINTS = "fused.ply"
 
 
-class Dnerf(Developed):
+class Dnerf(ForTraining):
     """D-NeRF's layout of a sequence: NeRF's synthetic layout with a time for each picture."""
 
     name = "dnerf"
     summary = "Sequence for D-NeRF and 4DGaussians."
     rank = 12
     loader = "python train.py -s {} --configs arguments/dnerf/lego.py  # 4DGaussians"
-    is_for_training = True
     chooses_tests = True
     is_of_sequence = True
     needs_surfaces = True

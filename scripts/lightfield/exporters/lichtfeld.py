@@ -33,7 +33,7 @@ from lightfield.exporters.base import (
     NO_DEPTH,
     NOT_EXR,
     TO_RECTILINEAR,
-    Developed,
+    ForTraining,
     PointCount,
     angle,
 )
@@ -53,14 +53,13 @@ MOST = np.iinfo(np.uint16).max
 _FLIP = np.array([1.0, -1.0, -1.0])
 
 
-class LichtFeld(Developed):
+class LichtFeld(ForTraining):
     """A dataset for LichtFeld Studio."""
 
     name = "lichtfeld"
     summary = "Dataset for LichtFeld Studio."
     rank = 10
     loader = "LichtFeld-Studio --data-path {} --output-path output"
-    is_for_training = True
     chooses_tests = True
     needs_surfaces = True
 

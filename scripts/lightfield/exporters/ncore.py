@@ -37,7 +37,7 @@ from lightfield.export import cameras
 from lightfield.export.points import Points, lift
 from lightfield.export.source import SourceDataset
 from lightfield.export.zarr_store import ZarrStore
-from lightfield.exporters.base import Developed, PointCount
+from lightfield.exporters.base import ForTraining, PointCount
 from lightfield.formats.lightfield import View
 from lightfield.geometry.exposure import Floats, pose_between, row_times
 from lightfield.geometry.lenses import Lens
@@ -111,7 +111,7 @@ def _row_times(source: SourceDataset) -> tuple[float, float] | None:
     return float(times[0]), float(times[-1])
 
 
-class NCore(Developed):
+class NCore(ForTraining):
     """A sequence of NCore v4, for gsplat and 3DGRUT."""
 
     name = "ncore"
@@ -121,7 +121,6 @@ class NCore(Developed):
         "python simple_trainer.py mcmc --data-type ncore --data-dir {}/views.json"
         " --data-factor 1 --init-type lidar --with-ut --with-eval3d  # gsplat"
     )
-    is_for_training = True
     has_row_times = True
     needs_surfaces = True
 

@@ -16,20 +16,19 @@ from lightfield.core.progress import Progress
 from lightfield.export import cameras
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import Developed, centred_pinhole
+from lightfield.exporters.base import ForTraining, centred_pinhole
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
 
-class NerfSynthetic(Developed):
+class NerfSynthetic(ForTraining):
     """The layout of NeRF's synthetic scenes: RGBA images, and a list for each part of the split."""
 
     name = "nerf_synthetic"
     summary = "Layout of NeRF's synthetic scenes, for programs that read it."
     rank = 4
     loader = "ns-train nerfacto --data {} blender-data"
-    is_for_training = True
     chooses_tests = True
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:

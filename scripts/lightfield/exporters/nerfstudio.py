@@ -26,7 +26,7 @@ from lightfield.export.pictures import write_pictures
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import DepthMaps, SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, Developed, PointCount
+from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ForTraining, PointCount
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
@@ -39,7 +39,7 @@ POINT_CLOUD = "points.ply"
 _DEPTH_UNIT = 0.001
 
 
-class Nerfstudio(Developed):
+class Nerfstudio(ForTraining):
     """A nerfstudio dataset, for nerfstudio and Brush."""
 
     name = "nerfstudio"
@@ -49,7 +49,6 @@ class Nerfstudio(Developed):
         "ns-train nerfacto --data {} nerfstudio-data --orientation-method none "
         "--center-method none --auto-scale-poses False"
     )
-    is_for_training = True
     chooses_tests = True
     needs_surfaces = True
 

@@ -18,7 +18,7 @@ from lightfield.export.llff import depths, write_poses_bounds
 from lightfield.export.points import lift, write_ply
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import Floats
-from lightfield.exporters.base import Developed, PointCount, centred_pinhole, odd_size_refusal
+from lightfield.exporters.base import ForTraining, PointCount, centred_pinhole, odd_size_refusal
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
@@ -27,14 +27,13 @@ POINTS = "points3D_downsample2.ply"
 _RATE_FACTOR = 10
 
 
-class Neural3dVideo(Developed):
+class Neural3dVideo(ForTraining):
     """The layout of Neural 3D Video: a video for each camera, and LLFF's poses_bounds.npy."""
 
     name = "neural_3d_video"
     summary = "Sequence in the layout of Neural 3D Video, for programs that read it."
     rank = 13
     loader = "python train.py -s {} --configs arguments/dynerf/default.py  # 4DGaussians"
-    is_for_training = True
     is_of_sequence = True
     needs_surfaces = True
 

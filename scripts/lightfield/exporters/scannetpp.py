@@ -18,7 +18,7 @@ from lightfield.core.files import write_json
 from lightfield.export.pictures import write_pictures
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import Developed, PointCount, angle
+from lightfield.exporters.base import ForTraining, PointCount, angle
 from lightfield.exporters.colmap import model
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
@@ -26,14 +26,13 @@ from lightfield.geometry.lenses.equidistant import Equidistant
 IMAGES = "image_undistorted_fisheye"
 
 
-class ScanNetPP(Developed):
+class ScanNetPP(ForTraining):
     """ScanNet++'s layout of a fisheye camera, for 3DGRUT and Fisheye-GS."""
 
     name = "scannetpp"
     summary = "ScanNet++'s fisheye layout, for 3DGRUT and Fisheye-GS."
     rank = 8
     loader = "python train.py --config-name apps/scannetpp_3dgut path={}  # 3DGRUT"
-    is_for_training = True
     chooses_tests = True
     needs_surfaces = True
 

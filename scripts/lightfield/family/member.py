@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import sys
+import time
 import traceback
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -14,7 +15,7 @@ from typing import Any
 from lightfield.configuration import scene_yaml
 from lightfield.configuration.config_file import Configuration
 from lightfield.configuration.dataset import Dataset
-from lightfield.configuration.family import FORMAT, RECORD, Member, drawn, member_content
+from lightfield.configuration.family import FORMAT, RECEIPT, RECORD, Member, drawn, member_content
 from lightfield.configuration.scene_checks.rigs import MOST_VIEWS
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core import leftovers
@@ -31,7 +32,7 @@ from lightfield.rendering.models import model_files
 from lightfield.stages.family import BatchSettings, BuildMembers
 from lightfield.stages.views import Device
 from lightfield.workflow.build import Build
-from lightfield.workflow.member_record import read_member
+from lightfield.workflow.member_record import BUILT, read_member
 
 # What a member is made of does not depend on these keys of a scene YAML.
 _DESCRIPTIVE_KEYS = ("description", "licence", "credit", "publish", "report")
@@ -53,7 +54,7 @@ class MemberBuild:
         place = settings.folder_of(member)
         self.folder = Path(settings.results, place)
         self.work = Path(settings.work, place)
-        self.receipt = Path(settings.work, receipts.FOLDER, place, f"member{receipts.SUFFIX}")
+        self.receipt = Path(settings.work, receipts.FOLDER, place, f"{RECEIPT}{receipts.SUFFIX}")
         self.record = self.folder / RECORD
         self.log = self.work / "member.log"
         self.values = drawn(settings.values, member)
@@ -89,6 +90,7 @@ class MemberBuild:
 
     def _build(self, device: Device, threads: int) -> dict[str, Any]:
         run = MemberRun()
+        began, cpu_began = time.time(), time.process_time()
         with self._opened_receipt() as receipt, _output_to(self.log):
             # From now on the member is neither valid nor failed.
             self.record.unlink(missing_ok=True)
@@ -101,7 +103,6 @@ class MemberBuild:
                 receipts.note_inputs(rig.file for rig in rigs if isinstance(rig, Poses))
                 datasets = self._datasets(written)
                 run.run(self._build_of(datasets), device, threads)
-                write_json(self.work / "cpu_seconds.json", run.seconds)
                 entries = {dataset.rig_folder: _listing(dataset) for dataset in datasets}
                 receipt.check_inputs()
                 record = self._write({"state": "valid", "datasets": entries})
@@ -109,6 +110,15 @@ class MemberBuild:
                 traceback.print_exc()
                 self._raise_outside_cause(error, receipt)
                 record = self._fail(receipt, run.stage, cause_of(error))
+            now = time.time()
+            receipt.log(
+                {
+                    BUILT: round(now, 3),
+                    "seconds": round(now - began, 3),
+                    "cpu_seconds": round(time.process_time() - cpu_began, 3),
+                    "stage_cpu_seconds": run.seconds,
+                }
+            )
             receipt.seal()
         return record
 
@@ -141,6 +151,8 @@ class MemberBuild:
                     references = model_files.survey(model).references
                     receipts.note_inputs(reference.path for reference in references)
             self._fail(receipt, self._last_stage(), cause)
+            # What it took died with the process.
+            receipt.log({BUILT: round(time.time(), 3)})
             receipt.seal()
 
     def _opened_receipt(self) -> AbstractContextManager[OpenReceipt]:
@@ -190,7 +202,7 @@ class MemberBuild:
             results=settings.results,
             work=settings.work,
         )
-        return Build(config, datasets, {dataset.name: dataset for dataset in datasets}, {})
+        return Build(config, datasets, {dataset.name: dataset for dataset in datasets}, {}, {})
 
     def _fail(self, receipt: OpenReceipt, stage: str, cause: str) -> dict[str, Any]:
         """Write and return the record of a failed member.

@@ -33,6 +33,8 @@ class MemberRun:
             print(f"stage: {self.stage}", flush=True)
             began = time.process_time()
             options = {key: machine[key] for key in machine if key in job.stage.model_fields}
-            job.stage_of(build, wildcards, fields | options).run()
-            seconds = self.seconds.get(self.stage, 0.0) + time.process_time() - began
-            self.seconds[self.stage] = round(seconds, 4)
+            try:
+                job.stage_of(build, wildcards, fields | options).run()
+            finally:
+                seconds = self.seconds.get(self.stage, 0.0) + time.process_time() - began
+                self.seconds[self.stage] = round(seconds, 4)

@@ -9,7 +9,8 @@ A change that makes a different picture is not a saving. The bias of a change is
 differences that it makes to renders of equal seeds. If the square of the bias, over all pixels, is
 above the variance of the reference, the picture differs. Then the change is not advised. The light
 tree and path guiding choose other paths to the same mean, so they are exempt. Changes of a clamp
-are reported with their bias, and never advised.
+are reported with their bias, and never advised. Nor are changes without an effect on the scene's
+views. `verdict` holds all of this.
 """
 
 import math
@@ -20,17 +21,21 @@ from typing import Any
 
 import numpy as np
 
+from lightfield.configuration.render_settings import CALIBRATED_KEYS
 from lightfield.formats.render_block import RenderBlock
 from lightfield.measurement import metrics
 from lightfield.measurement.effort import effort_for
 from lightfield.measurement.experiment import WHOLE_VIEWS, Experiment, Method, References
-from lightfield.planning.sampling import DENOISED, TRACED, standard_error
+from lightfield.planning.sampling import DENOISED, DENOISER_KEYS, TRACED, standard_error
 
 # Changes are rendered with this many samples a pixel, the unchanged scene also with half and twice.
 SAMPLES = 8
 SEEDS = range(1, 5)
 # Adaptive sampling has no effect below about thirty samples.
 ADAPTIVE = {"samples": 64, "adaptive_threshold": 0.2}
+# The verdict on a change that is advised. All others begin with "no", and give the reason.
+ADVISED = "yes"
+_SAVES_LESS = "no: another change saves more"
 # A change is advised if it saves at least the factor WORTH, by SURE standard errors.
 _WORTH = 1.03
 _SURE = 2.0
@@ -67,19 +72,22 @@ class Change:
     """A change of a scene's ``render`` block, and the ``settings`` that render it.
 
     ``compared_with`` names the unchanged renders in `_UNCHANGED`. ``unbiased`` says that the change
-    is known to keep the picture. A change that is not ``may_be_advised`` is only reported.
+    is known to keep the picture.
     """
 
     compared_with: str
     change: Mapping[str, Any]
     settings: Mapping[str, Any]
     unbiased: bool = False
-    may_be_advised: bool = True
 
     @property
     def method(self) -> Method:
         """The method of the experiment that renders this change."""
         return Method(self.compared_with, self.settings)
+
+    def keeps_picture(self, saving: "Saving") -> bool:
+        """Return whether the picture stays the same, by what is known or measured."""
+        return self.unbiased or saving.bias <= saving.noise
 
 
 @dataclass(frozen=True)
@@ -101,10 +109,40 @@ class Saving:
     noise: float
     light: float
 
+
+@dataclass(frozen=True)
+class Tried:
+    """A change, its savings by stratum and of whole views, and the `verdict` on it."""
+
+    change: Change
+    savings: Mapping[str, Saving]
+    verdict: str
+
     @property
-    def same_picture(self) -> bool:
-        """Whether the bias is within the noise of the reference."""
-        return self.bias <= self.noise
+    def is_advised(self) -> bool:
+        """Whether the change is advised."""
+        return self.verdict == ADVISED
+
+    @property
+    def times(self) -> float:
+        """How many times as long whole views take without the change. Only of an advised one."""
+        return self.savings[WHOLE_VIEWS].times
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the entry of the report."""
+        return {
+            "of": self.change.compared_with,
+            "change": dict(self.change.change),
+            "advised": self.is_advised,
+            "verdict": self.verdict,
+            "savings": {
+                stratum: {
+                    **asdict(saving),
+                    "same_picture": self.change.keeps_picture(saving),
+                }
+                for stratum, saving in self.savings.items()
+            },
+        }
 
 
 @dataclass(frozen=True)
@@ -149,7 +187,7 @@ def changes_to_try(sampling: Mapping[str, Any], on_cpu: bool) -> list[Change]:
         switched = {name: not sampling[name]}
         changes.append(Change(TRACED, switched, traced | switched, unbiased=True))
     changes += [Change(TRACED, change, traced | change) for change in bounces]
-    changes += [Change(TRACED, change, traced | change, may_be_advised=False) for change in clamps]
+    changes += [Change(TRACED, change, traced | change) for change in clamps]
     threshold = {"adaptive_threshold": ADAPTIVE["adaptive_threshold"]}
     changes.append(Change(TRACED, threshold, ADAPTIVE))
     changes.append(Change(TRACED, {"denoise": True}, denoised))
@@ -166,16 +204,13 @@ def measure(
     progress lines.
     """
     title = f"{name}: trials"
-    sampling = {**inventory["sampling"], **render.to_json()}
-    changes = changes_to_try(sampling, experiment.device == "CPU")
+    own = own_settings(render, inventory["sampling"])
+    changes = changes_to_try(own, experiment.device == "CPU")
     unchanged = [method for methods in _UNCHANGED.values() for method in methods]
     experiment.run([*unchanged, *(change.method for change in changes)], SEEDS, title)
-    measured = [(change, savings(experiment, change)) for change in changes]
-    advised = _advised_changes(measured)
-    combined = _combination([change for change in advised if change.compared_with == TRACED])
-    if combined:
-        experiment.run([combined.method], SEEDS, title)
-        measured.append((combined, savings(experiment, combined)))
+    tried = _best_of_keys([_tried(experiment, change, own) for change in changes])
+    for compared_with in _UNCHANGED:
+        tried = _together(experiment, tried, compared_with, own, title)
     return {
         "seeds": len(SEEDS),
         "device": experiment.device,
@@ -185,62 +220,115 @@ def measure(
             of: [_unchanged_figures(experiment, method) for method in methods]
             for of, methods in _UNCHANGED.items()
         },
-        "tried": [
-            {
-                "of": change.compared_with,
-                "change": dict(change.change),
-                "advised": change in advised,
-                "savings": {
-                    stratum: {**asdict(saving), "same_picture": saving.same_picture}
-                    for stratum, saving in by_stratum.items()
-                },
-            }
-            for change, by_stratum in measured
-        ],
-        "yaml": {key: value for change in advised for key, value in change.change.items()},
+        "tried": [entry.to_json() for entry in tried],
+        "yaml": {
+            key: value
+            for entry in tried
+            if entry.is_advised
+            for key, value in entry.change.change.items()
+        },
         "costly": {"lights": inventory["lights"]}
         | {feature: inventory[feature] for feature in COSTLY if inventory[feature]},
     }
 
 
-def _advised_changes(measured: Sequence[tuple[Change, Mapping[str, Saving]]]) -> list[Change]:
-    """Return the advised changes. Of several values of a key, only the one that saves most."""
-    good = [
-        (saved[WHOLE_VIEWS].times, change)
-        for change, saved in measured
-        if is_advised(change, saved.get(WHOLE_VIEWS))
+def own_settings(render: RenderBlock, sampling: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the scene's settings: its ``render`` block, the .blend's ``sampling``, defaults."""
+    defaults = {"denoise_quality": "high", "denoise_prefilter": "accurate"}
+    return {**defaults, **sampling, "denoise": render.denoise, **render.to_json()}
+
+
+def verdict(change: Change, saving: Saving | None, own: Mapping[str, Any]) -> str:
+    """Return `ADVISED`, or "no" and why a change is not advised.
+
+    An advised change takes effect in a scene with its `own_settings`, keeps the picture, and surely
+    saves time. ``saving`` is the saving in whole views, or None without noise.
+    """
+    if reason := _without_effect(change.change, own):
+        return f"no: {reason}"
+    if "clamp_indirect" in change.change:
+        return "no: a clamp is only reported"
+    if saving is None:
+        return "no: the renders have no noise"
+    if not change.keeps_picture(saving):
+        return "no: another picture"
+    if saving.times - _SURE * saving.uncertainty < _WORTH:
+        return "no: does not surely save time"
+    if saving.times_of_all_pixels + _SURE * saving.uncertainty_of_all_pixels < 1:
+        return "no: hides rare bright pixels"
+    return ADVISED
+
+
+def _without_effect(change: Mapping[str, Any], own: Mapping[str, Any]) -> str | None:
+    """Return why a scene YAML with a change renders the same, or is refused. None if neither."""
+    if all(own.get(key) == value for key, value in change.items()):
+        return "your own setting"
+    if "target_error" in own and not change.keys().isdisjoint(CALIBRATED_KEYS):
+        return "your target_error chooses it"
+    if "light_groups" in own and "denoise" in change:
+        return "your light_groups must add up to the colour"
+    if not own["denoise"] and not change.keys().isdisjoint(DENOISER_KEYS):
+        return "your views are not denoised"
+    return None
+
+
+def _tried(experiment: Experiment, change: Change, own: Mapping[str, Any]) -> Tried:
+    """Return a change that was rendered, with its savings and the verdict."""
+    by_stratum = savings(experiment, change)
+    return Tried(change, by_stratum, verdict(change, by_stratum.get(WHOLE_VIEWS), own))
+
+
+def _best_of_keys(tried: Sequence[Tried]) -> list[Tried]:
+    """Advise only the value that saves most of several values of a key."""
+    best: dict[tuple[str, ...], Tried] = {}
+    for entry in tried:
+        keys = tuple(entry.change.change)
+        if entry.is_advised and (keys not in best or entry.times > best[keys].times):
+            best[keys] = entry
+    return _only_advised(tried, list(best.values()))
+
+
+def _together(
+    experiment: Experiment,
+    tried: Sequence[Tried],
+    compared_with: str,
+    own: Mapping[str, Any],
+    title: str,
+) -> list[Tried]:
+    """Try the advised changes of one comparison together, if they are two or more.
+
+    If they are not advised together, only the one that saves most is.
+    """
+    others = [entry for entry in tried if entry.change.compared_with != compared_with]
+    parts = [entry for entry in tried if entry.is_advised and entry not in others]
+    if len(parts) < 2:
+        return list(tried)
+    combined = _combination([entry.change for entry in parts])
+    experiment.run([combined.method], SEEDS, title)
+    together = _tried(experiment, combined, own)
+    if not together.is_advised:
+        best = max(parts, key=lambda entry: entry.times)
+        tried = _only_advised(tried, [best, *others])
+    return [*tried, together]
+
+
+def _only_advised(tried: Sequence[Tried], advised: Sequence[Tried]) -> list[Tried]:
+    """Take back the advice of all entries but ``advised``."""
+    return [
+        entry if entry in advised or not entry.is_advised else replace(entry, verdict=_SAVES_LESS)
+        for entry in tried
     ]
-    good.sort(key=lambda pair: pair[0])
-    # Later changes, which save more, replace earlier ones of the same keys.
-    by_keys = {tuple(change.change): change for _, change in good}
-    return list(by_keys.values())
 
 
-def _combination(changes: Sequence[Change]) -> Change | None:
-    """Return several changes as one, which is only reported. None for fewer than two."""
-    if len(changes) < 2:
-        return None
+def _combination(changes: Sequence[Change]) -> Change:
+    """Return several changes of one comparison as one."""
     combined: dict[str, Any] = {}
     settings: dict[str, Any] = {}
     for part in changes:
         combined |= part.change
         settings |= part.settings
-    return Change(TRACED, combined, settings, may_be_advised=False)
-
-
-def is_advised(change: Change, saving: Saving | None) -> bool:
-    """Return whether a change surely saves time and keeps the picture.
-
-    A denoiser defines its own picture, so its bias is part of its error.
-    """
-    return (
-        saving is not None
-        and change.may_be_advised
-        and saving.times - _SURE * saving.uncertainty >= _WORTH
-        # A change must not save by hiding rare bright pixels.
-        and saving.times_of_all_pixels + _SURE * saving.uncertainty_of_all_pixels >= 1
-        and (change.compared_with == DENOISED or change.unbiased or saving.same_picture)
-    )
+    unbiased = all(part.unbiased for part in changes)
+    return Change(changes[0].compared_with, combined, settings, unbiased)
 
 
 def savings(experiment: Experiment, change: Change) -> dict[str, Saving]:
@@ -387,7 +475,8 @@ def _savings_table(content: Mapping[str, Any]) -> list[str]:
         "all their pixels with the worst thousandth, and what pixels show. The bias counts all",
         "pixels, over the noise of the reference. Light is the relative change of all light. A",
         "bias above 1 means another picture, and the change is not advised. The light tree and",
-        "guiding are exempt, because their mean is the same. — is as good as the reference.",
+        "guiding are exempt, because their mean is the same. A denoiser is not exempt: its times",
+        "are those to the same error, but its picture differs. — is as good as the reference.",
         "",
         f"| change | of | advised | {columns[0]} | all pixels | bias | light "
         f"| {' | '.join(columns[1:])} |",
@@ -401,13 +490,13 @@ def _savings_table(content: Mapping[str, Any]) -> list[str]:
         if whole_views:
             details = [
                 f"{whole_views['times_of_all_pixels']:.2f}",
-                f"{whole_views['bias'] / whole_views['noise']:.2g}",
+                f"{whole_views['bias'] / whole_views['noise']:.3g}",
                 f"{whole_views['light']:+.2%}",
             ]
         cells = [
-            f"`{_yaml(entry['change'])}`",
+            f"`{yaml_of(entry['change'])}`",
             entry["of"],
-            "yes" if entry["advised"] else "no",
+            entry["verdict"],
             times[0],
             *details,
             *times[1:],
@@ -444,7 +533,7 @@ def _advised_yaml(content: Mapping[str, Any]) -> list[str]:
     if not content["yaml"]:
         return [
             "",
-            "Nothing is advised: no change surely saves time and keeps the picture.",
+            "Keep your settings: no change of them surely saves time and keeps the picture.",
         ]
     return [
         "",
@@ -452,7 +541,7 @@ def _advised_yaml(content: Mapping[str, Any]) -> list[str]:
         "",
         "```yaml",
         "render:",
-        *(f"  {_yaml({key: value})}" for key, value in content["yaml"].items()),
+        *(f"  {yaml_of({key: value})}" for key, value in content["yaml"].items()),
         "```",
     ]
 
@@ -461,5 +550,6 @@ def _times(saving: Mapping[str, Any] | None) -> str:
     return f"{saving['times']:.2f} ± {saving['uncertainty']:.2f}" if saving else "—"
 
 
-def _yaml(change: Mapping[str, Any]) -> str:
+def yaml_of(change: Mapping[str, Any]) -> str:
+    """Return a change as YAML in one line."""
     return ", ".join(f"{key}: {str(value).lower()}" for key, value in change.items())

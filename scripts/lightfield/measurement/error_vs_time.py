@@ -81,6 +81,9 @@ _FIGURES = (
     "flip",
 )
 
+# The figures of `Denoising` that have a column in its table.
+_DENOISING = ("side", "seconds", "in_windows")
+
 # The keys of a point that name its method. All others are figures.
 _METHOD_KEYS = ("method", "settings")
 
@@ -158,6 +161,7 @@ def measure(
         ]
         for stratum, references in experiment.strata.items()
     }
+    changes = advice.measure(experiment, render, renderer.inventory, name)
     return {
         "measured_on": {
             **experiment.described(),
@@ -176,7 +180,7 @@ def measure(
             for stratum, references in experiment.strata.items()
         },
         "neighbouring_views": _neighbour_disagreements(experiment, methods) if neighbour else [],
-        "changes": advice.measure(experiment, render, renderer.inventory, name),
+        "changes": changes,
     }
 
 
@@ -450,7 +454,12 @@ def _csv_rows(content: Mapping[str, Any]) -> list[dict[str, Any]]:
 def tables(name: str, content: Mapping[str, Any]) -> str:
     """Return the methods at equal time and at equal error, all figures, and advice, in Markdown."""
     if content["methods"]:
-        lines = [*_equal_table(name, content), *_figures_table(content), *_strata_table(content)]
+        lines = [
+            *_equal_table(name, content),
+            *_figures_table(content),
+            *_strata_table(content),
+            *_denoising_table(content),
+        ]
     else:
         lines = [
             f"# {name}",
@@ -516,6 +525,26 @@ def _strata_table(content: Mapping[str, Any]) -> list[str]:
         f"| {' | '.join(columns)} |",
         "| --- | ---: | --- " + "| ---: " * (len(columns) - 3) + "|",
         *(_row(*row) for row in rows),
+    ]
+
+
+def _denoising_table(content: Mapping[str, Any]) -> list[str]:
+    """Return the denoiser's time in the windows, which is not counted, and in a larger one."""
+    measured_on = content["measured_on"]
+    side = measured_on["size"]
+    return [
+        "",
+        f"Denoising a megapixel takes longer in windows of {side}² than in a view. So all times",
+        "count it as in a larger window:",
+        "",
+        f"| denoiser | side of the larger window | its s a megapixel | s in windows of {side}² |",
+        "| --- | ---: | ---: | ---: |",
+        *(
+            _row(
+                f"`{advice.yaml_of(measured['settings'])}`", *(measured[key] for key in _DENOISING)
+            )
+            for measured in content["measured_on"]["denoising"]
+        ),
     ]
 
 

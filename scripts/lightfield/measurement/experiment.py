@@ -8,9 +8,9 @@ comparing these renders with a reference of the same window (see `metrics`). `er
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from statistics import fmean
+from statistics import fmean, median
 from typing import Any
 
 from lightfield.core.errors import UserError
@@ -18,12 +18,23 @@ from lightfield.core.progress import Progress
 from lightfield.measurement import metrics, strata
 from lightfield.measurement.metrics import Reference
 from lightfield.measurement.trials import Trial, Trials, ViewWindow
+from lightfield.planning.sampling import DENOISER_KEYS
 
 # The name of all strata together in reports.
 WHOLE_VIEWS = "whole views"
 
 # A stratified reference splits its samples among this many seeds. Their differences tell its error.
 _REFERENCE_SEEDS = 8
+
+# Denoising a pixel takes up to twice as long in a window of 64² as in a view. From this side on, a
+# larger window makes less than a tenth of a difference.
+_DENOISED_SIDE = 256
+# The denoiser's time is the median over these seeds.
+_DENOISED_SEEDS = range(1, 4)
+
+# The correction of a render's time is at most this part of it, so that no load on the machine while
+# the denoiser was timed leaves a time below zero.
+_MOST_EXCESS = 0.9
 
 # The renders of one method, by window and seed.
 Renders = Sequence[Sequence[Trial]]
@@ -42,6 +53,19 @@ class Method:
     def key(self) -> str:
         """The key of this method's renders: its settings."""
         return json.dumps(self.settings)
+
+
+@dataclass(frozen=True)
+class Denoising:
+    """The seconds that denoising a megapixel takes with some ``settings``.
+
+    ``seconds`` are of a window of ``side`` pixels, ``in_windows`` of the experiment's own windows.
+    """
+
+    settings: Mapping[str, Any]
+    side: int
+    seconds: float
+    in_windows: float
 
 
 class Experiment:
@@ -67,6 +91,7 @@ class Experiment:
         areas = areas or {WHOLE_VIEWS: 1.0}
         self.areas = {stratum: areas[stratum] for stratum in self.strata}
         self._renders: dict[str, list[list[Trial]]] = {}
+        self._denoising: dict[str, Denoising] = {}
 
     @classmethod
     def stratified(
@@ -109,12 +134,13 @@ class Experiment:
     @property
     def megapixels(self) -> float:
         """The size of a window. All have the same size."""
-        return self.windows[0].width * self.windows[0].height / 1e6
+        return self.windows[0].megapixels
 
     def run(self, methods: Iterable[Method], seeds: Sequence[int], title: str = "") -> None:
         """Render all windows with all methods and seeds. A ``title`` starts the progress lines.
 
-        Methods take turns, so that another load on the machine slows all of them alike.
+        Methods take turns, so that another load on the machine slows all of them alike. The time of
+        denoised renders is corrected: it counts denoising as in a large window.
         """
         by_key = {method.key: method for method in methods}
         for key in by_key:
@@ -125,9 +151,36 @@ class Experiment:
             for number, window in enumerate(self.windows):
                 for key, method in by_key.items():
                     trial = self.renderer.render(window, seed, method.settings)
-                    self._renders[key][number].append(trial)
+                    excess = self._denoising_excess(method.settings)
+                    excess = min(excess, _MOST_EXCESS * trial.seconds)
+                    corrected = replace(trial, seconds=trial.seconds - excess)
+                    self._renders[key][number].append(corrected)
                     if progress:
                         progress.done()
+
+    def _denoising_excess(self, settings: Mapping[str, Any]) -> float:
+        """Return the seconds that denoising takes longer in a window than in a large window."""
+        if not settings.get("denoise"):
+            return 0.0
+        keys = ("denoise", *DENOISER_KEYS)
+        denoiser = {key: settings[key] for key in keys if key in settings}
+        key = json.dumps(denoiser)
+        if key not in self._denoising:
+            self._denoising[key] = self._measured_denoising(denoiser)
+        measured = self._denoising[key]
+        return (measured.in_windows - measured.seconds) * self.megapixels
+
+    def _measured_denoising(self, denoiser: Mapping[str, Any]) -> Denoising:
+        """Measure the time of denoising in the first window, and in a large one around it."""
+        window = self.windows[0]
+        large = window.grown(max(_DENOISED_SIDE, window.width), self.renderer.lens)
+        by_window: dict[ViewWindow, list[float]] = {window: [], large: []}
+        for seed in _DENOISED_SEEDS:
+            for place, seconds in by_window.items():
+                plain = self.renderer.render(place, seed, {"samples": 1})
+                denoised = self.renderer.render(place, seed, {"samples": 1, **denoiser})
+                seconds.append((denoised.seconds - plain.seconds) / place.megapixels)
+        return Denoising(denoiser, large.width, median(by_window[large]), median(by_window[window]))
 
     def renders(self, method: Method) -> Renders:
         """Return the renders of a method from `run`, by window and seed."""
@@ -169,11 +222,12 @@ class Experiment:
         )
 
     def described(self) -> dict[str, Any]:
-        """Return the windows of this experiment, for its report."""
+        """Return the windows of this experiment, and the time of denoising, for its report."""
         return {
             "probes": [window.name for window in self.windows],
             "size": self.windows[0].width,
             "resolution": [self.renderer.lens.width, self.renderer.lens.height],
+            "denoising": [asdict(measured) for measured in self._denoising.values()],
         }
 
 

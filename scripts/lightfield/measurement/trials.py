@@ -75,6 +75,24 @@ class ViewWindow:
         """The view's name and the window's place in it."""
         return f"{self.view.name}+{self.x}+{self.y}"
 
+    @property
+    def megapixels(self) -> float:
+        """The size of the window."""
+        return self.width * self.height / 1e6
+
+    def grown(self, side: int, lens: Lens) -> "ViewWindow":
+        """Return a window of ``side``² pixels around this one, within the view.
+
+        A smaller view is one window.
+        """
+        width = min(side, lens.width)
+        height = min(side, lens.height)
+        x = self.x + (self.width - width) // 2
+        y = self.y + (self.height - height) // 2
+        x = min(max(x, 0), lens.width - width)
+        y = min(max(y, 0), lens.height - height)
+        return ViewWindow(self.view, x, y, width, height)
+
 
 @dataclass(frozen=True)
 class Trial:

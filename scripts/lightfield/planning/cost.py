@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
@@ -78,6 +78,8 @@ _SCENE_RESERVE = 1.2
 
 # The page and the figures show at most so many views.
 _MOST_SHOWN_VIEWS = 120
+# The page of a sequence shows one view of each frame, or more views, but at most so many.
+_MOST_VIEWS_OF_SEQUENCE = 240
 
 # Start-up takes at most this part of a shard's time.
 _START_UP_PART = 0.05
@@ -179,6 +181,13 @@ def checking(dataset: Dataset) -> Cost:
 def drawing(dataset: Dataset) -> Cost:
     """Return the cost of a job that draws the figures, or writes the page."""
     return JOB + _pictures(dataset)
+
+
+def drawing_frames(frames: Sequence[Dataset]) -> Cost:
+    """Return the cost of the job that writes the page of a sequence."""
+    views = len(frames) * frames[0].view_count
+    shown_views = max(len(frames), min(views, _MOST_VIEWS_OF_SEQUENCE))
+    return JOB + Cost(shown_views * frames[0].pixels * REPORT_SECONDS)
 
 
 def rendering_panorama(dataset: Dataset) -> Cost:

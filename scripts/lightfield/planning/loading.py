@@ -211,14 +211,16 @@ def _exports_of(
     """Return the exports of a rig's views and ``reprojections``.
 
     A rig that tests another rig's training has no training exports of its own. The other rig's
-    exports include its views.
+    exports include its views. Rigs that are exported together have one export, of the first.
     """
     is_tested_elsewhere = written.rigs[name].split in _TESTED_WITH
     exports = {}
     for key, export in written.exports.selected.items():
         sources = [source for source in export.sources if source in (VIEWS, *reprojections)]
-        is_chosen = name in (export.rigs or written.rigs)
+        is_chosen = name in (export.chosen_rigs or written.rigs)
         belongs_elsewhere = is_tested_elsewhere and export.is_for_training
+        if export.joined_rigs:
+            belongs_elsewhere = name != export.joined_rigs[0]
         is_made = is_chosen and not belongs_elsewhere
         exports[key] = export.model_copy(update={"sources": sources}) if is_made else None
     return written.exports.model_copy(update=exports)

@@ -40,6 +40,9 @@ BIAS_PART = 0.1
 # 256² and more on an EPYC. In small windows denoising costs up to twice as much.
 DENOISING_SAMPLES = 3
 
+# The settings that change how a denoised view is denoised.
+DENOISER_KEYS = ("denoise_quality", "denoise_prefilter")
+
 PLAIN = {"adaptive_threshold": 0, "denoise": False}
 
 

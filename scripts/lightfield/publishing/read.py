@@ -1,7 +1,6 @@
 """Reads a light field of Plenoforge with numpy and OpenEXR alone. Copy this file freely.
 
     from read import open_views
-
     view = open_views()[0]  # of the folder of this file; open_views("perspective") if it has that
     view.rgb, view.alpha, view.depth, view.normal  # arrays, as float32, if the dataset has them
     origins, directions = view.rays()  # of every pixel, in the world
@@ -12,6 +11,7 @@ coordinates run right and down; the first pixel's centre is (0.5, 0.5). Shards n
 """
 
 import json
+import re
 import tarfile
 from contextlib import nullcontext
 from pathlib import Path
@@ -25,25 +25,29 @@ BRADFORD = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.06
 
 
 def open_views(reprojection: str = "", folder: Any = Path(__file__).parent) -> "list[PlainView]":
-    """Return the views in a folder: of its lightfield.json, of its frames, or of its shards."""
-    views: Any = {}
-    frame = "." if Path(folder, "lightfield.json").is_file() else "f[0-9]*"
-    for file in Path(folder).glob(f"{frame}/{reprojection or '.'}/lightfield.json"):
+    """Return the views in a folder: of its lightfield.json, of its frames, or of all its shards."""
+    folder, views = Path(folder).absolute(), dict[Any, PlainView]()
+    frame = "." if (folder / "lightfield.json").is_file() else "f[0-9]*"
+    names = {file.parent.name for file in folder.glob(f"{frame}/*/lightfield.json")}
+    for file in folder.glob(f"{frame}/{reprojection or '.'}/lightfield.json"):
         content = json.loads(file.read_text("utf-8"))
         for number, view in enumerate(content["frames"]):
-            views[len(str(file)), file, number] = PlainView(
-                content | view, reprojection, file.parent
-            )
-    for shard in [] if views else Path(folder).glob("*-[0-9]*.tar"):
-        with tarfile.open(shard) as tar:
+            place = len(str(file)), file, number
+            views[place] = PlainView(content | view, reprojection, file.parent)
+    sums = "".join(file.read_text("utf-8") for file in folder.glob("sha256sums.txt"))
+    for shard in [] if views else re.findall(r"\S+-\d+\.tar", sums) or folder.glob("*-[0-9]*.tar"):
+        with tarfile.open(folder / shard) as tar:
             members: Any = {member.name: tar.extractfile(member) for member in tar}
             samples = {n[:-5]: json.load(members[n]) for n in members if n.endswith(".json")}
         for key, sample in samples.items():
             files = {Path(p["path"]): f"{key}.{field}" for field, p in sample["pictures"].items()}
+            names |= {path.parent.name for path in files}
             for path, picture in zip(files, sample["pictures"].values(), strict=True):
                 if path.parent == Path(reprojection or "exr"):
                     content = picture | {"name": path.stem, "split": sample["split"]}
-                    views[key, path.stem] = PlainView(content, reprojection, shard, files)
+                    views[key, path.stem] = PlainView(content, reprojection, folder / shard, files)
+    if not views:
+        raise ValueError(f"{folder}: has no views {reprojection!r}; it has {sorted(names)}")
     return [views[place] for place in sorted(views)]
 
 
@@ -54,15 +58,13 @@ class PlainView:
         self.content, self.lens = content, PlainLens(content)
         self.reprojection, self.home, self.members = reprojection, home, members
         self.name, self.split = content["name"], content.get("split")
-        self.world_from_camera = np.array(content["world_matrix"])
+        self.world_from_camera = pose = np.array(content["world_matrix"])
         # NaN for omnidirectional stereo, whose rays have no common origin.
-        has_centre = "omnidirectional_stereo" not in content
-        self.position = self.world_from_camera[:3, 3] if has_centre else np.full(3, np.nan)
+        self.position = np.where("omnidirectional_stereo" in content, np.nan, pose[:3, 3])
 
-    # Light in Rec. 709, coverage, normals in the world, and metres: as content["depth"] says, along
-    # the optical axis, and from the camera along the ray.
+    # Light in Rec. 709, coverage, world normals, and metres: as stored, along the axis, or the ray.
     rgb = property(lambda self: to_rec_709(*self.read()))
-    alpha = property(lambda self: self.read()[0]["A"].astype(np.float32))
+    alpha = property(lambda self: np.single(self.read()[0].get("A", np.ones(self.lens.size[::-1]))))
     normal = property(lambda self: np.stack([*map(self.read("normal")[0].get, "RGB")], axis=-1))
     depth = property(lambda self: self.depth_as(self.content["depth"]))
     z = property(lambda self: self.depth_as("z"))
@@ -173,9 +175,8 @@ class PlainLens:
 
 def first_root(polynomial: Any) -> Any:
     """Return the smallest positive root, or inf."""
-    roots = np.roots(polynomial.coef[::-1])
-    is_real = (np.abs(roots.imag) <= 1e-12 * np.abs(roots)) & (roots.real > 0)
-    return np.min(roots.real[is_real], initial=np.inf)
+    roots = [r for r in np.roots(polynomial.coef[::-1]) if abs(r.imag) <= 1e-12 * abs(r)]
+    return min([root.real for root in roots if root.real > 0], default=np.inf)
 
 
 def inverse(polynomial: Any, last: float, least: float, values: Any) -> Any:
@@ -194,6 +195,5 @@ def to_rec_709(channels: Any, header: Any) -> Any:
         x, y = np.reshape(space, (4, 2)).T
         cones = BRADFORD @ np.stack([x / y, np.ones(4), (1 - x - y) / y])
         spaces.append(cones[:, :3] * np.linalg.solve(cones[:, :3], cones[:, 3]) / cones[:, 3:])
-    if np.allclose(chromaticities, REC_709, rtol=0, atol=1e-4):
-        return colour
-    return (colour @ np.linalg.solve(spaces[1], spaces[0]).T).astype(np.float32)
+    is_rec_709 = np.allclose(chromaticities, REC_709, rtol=0, atol=1e-4)
+    return colour if is_rec_709 else np.float32(colour @ np.linalg.solve(spaces[1], spaces[0]).T)

@@ -35,8 +35,10 @@ Bools = NDArray[np.bool_]
 class OpenView:
     """One view. Arrays have a row for each row of pixels, from the top: (height, width, …).
 
-    ``dataset`` is the dataset of its frame. ``camera`` is its entry in lightfield.json. A property
-    reads its file each time, so keep the arrays that you need again.
+    A property reads its file each time, so keep the arrays that you need again.
+
+    - ``dataset``: the dataset of its frame.
+    - ``camera``: its entry in lightfield.json.
     """
 
     dataset: "OpenDataset"
@@ -57,7 +59,7 @@ class OpenView:
 
     @property
     def world_from_camera(self) -> Doubles:
-        """The camera-to-world matrix (4, 4). The camera looks along −Z, and +Y is up."""
+        """The camera-to-world matrix (4, 4) in metres. The camera looks along −Z, +Y is up."""
         return self.camera.world_from_camera.copy()
 
     @property
@@ -89,8 +91,14 @@ class OpenView:
 
     @property
     def alpha(self) -> Floats:
-        """The part of each pixel (height, width) that the scene covers, from 0 to 1."""
-        return self.image(["A"]).alpha.astype(np.float32)
+        """The part of each pixel (height, width) that the scene covers, from 0 to 1.
+
+        1 in a view without transparency, whose file has no alpha.
+        """
+        image = self.image()
+        if "A" not in image.channels:
+            return np.ones((self.lens.height, self.lens.width), np.float32)
+        return image.alpha.astype(np.float32)
 
     @property
     def depth(self) -> Floats:
@@ -118,15 +126,11 @@ class OpenView:
     def read(self, name: str) -> Array:
         """Return a pass: (height, width, channels), or (height, width) if it has one channel.
 
-        Numbers of objects are whole. All other passes are float32.
+        Numbers of objects are whole. All other passes are float32. The reference of passes has
+        their units.
         """
-        names = self.dataset.passes
-        if name not in names:
-            raise UserError(
-                f"{self.dataset.lightfield.path}: passes: has no {name!r}; it has "
-                f"{', '.join(names) or 'none'}"
-            )
-        view_pass = FLOW if name == FLOW.name else passes.by_name(name)
+        self.dataset.require_pass(name)
+        view_pass = _pass_named(name)
         image = self._read(self._file_of_pass(view_pass), view_pass.channels)
         pixels: Array = np.stack(
             [image.channels[channel] for channel in view_pass.channels], axis=-1
@@ -137,8 +141,7 @@ class OpenView:
 
     def pass_path(self, name: str) -> Path:
         """Return the file of a pass. It may be missing."""
-        view_pass = FLOW if name == FLOW.name else passes.by_name(name)
-        return self.dataset.files.place(self._file_of_pass(view_pass))
+        return self.dataset.files.place(self._file_of_pass(_pass_named(name)))
 
     def _file_of_pass(self, view_pass: Pass) -> str:
         view = (self.camera.flow or "") if view_pass == FLOW else self.name
@@ -170,11 +173,13 @@ class OpenView:
     def depth_as(self, meaning: str | None) -> Doubles:
         """Return the depth (height, width) in metres, as "z" or "distance", with all its digits.
 
-        inf for a miss, NaN for a pixel without depth. Raises `UserError` if ``meaning`` is None.
+        inf for a miss, NaN for a pixel without depth. Raises `UserError` for another ``meaning``.
         """
         lightfield = self.dataset.lightfield
         if meaning is None:
             raise UserError(f"{lightfield.path}: depth: is null; these views have no depth")
+        if meaning not in ("z", "distance"):
+            raise UserError(f"depth: is {meaning!r}; must be z or distance")
         with self.dataset.files.on_disk(self._picture) as file:
             return depth_of(file, lightfield, _unit_rays(self.lens), meaning)
 
@@ -214,7 +219,11 @@ class OpenView:
 
 
 class OpenViews(Sequence[OpenView]):
-    """Views in the order of lightfield.json: by number, by name, or a part of them."""
+    """Views in the order of lightfield.json, as a Python sequence.
+
+    ``views[3]``, ``views[-1]`` and ``views["view_0003f"]`` are an `OpenView`, and ``views[2:5]`` is
+    an `OpenViews`. Raises `UserError` for an unknown name, and IndexError for an unknown number.
+    """
 
     def __init__(self, views: Iterable[OpenView]) -> None:
         self._views = list(views)
@@ -232,7 +241,16 @@ class OpenViews(Sequence[OpenView]):
     def __getitem__(self, key: int | str | slice) -> "OpenView | OpenViews":
         if isinstance(key, slice):
             return OpenViews(self._views[key])
-        return self._named(key) if isinstance(key, str) else self._views[key]
+        return self._named(key) if isinstance(key, str) else self._numbered(key)
+
+    def _numbered(self, number: int) -> OpenView:
+        try:
+            return self._views[number]
+        except IndexError:
+            # Python's own exception, by which loops over a sequence end.
+            count = len(self)
+            among = f"; they are 0 to {count - 1}" if count else ""
+            raise IndexError(f"{number}: is none of the {count} views{among}") from None
 
     @cached_property
     def _by_name(self) -> dict[str, list[OpenView]]:
@@ -252,12 +270,28 @@ class OpenViews(Sequence[OpenView]):
         raise UserError(f"{name}: is none of the {len(self)} views{among}")
 
 
+class Reprojections(dict[str, "OpenDataset"]):
+    """The reprojections of a dataset by their names, as a dict of `OpenDataset`.
+
+    Raises `UserError` for an unknown name.
+    """
+
+    def __init__(self, place: Path, datasets: Mapping[str, "OpenDataset"]) -> None:
+        super().__init__(datasets)
+        self._place = place
+
+    def __missing__(self, name: str) -> "OpenDataset":
+        among = ", ".join(self) or "none"
+        raise UserError(f"{self._place}: reprojections: has no {name!r}; it has {among}")
+
+
 @dataclass(frozen=True, eq=False)
 class OpenDataset:
     """The views of one rig, or of one of its ``reprojection``s: each has a lens and poses.
 
     - ``files``: the files of the dataset, in a folder, a package or shards.
     - ``folders``: the folder of each frame of a sequence. Without a sequence, the dataset's own.
+    - ``reprojection``: the name of the reprojection. Empty for the rig's own views.
     - ``times``: the time of each frame: 0 for the first, 1 for the last.
     - ``member``: in a corpus, what corpus.json says of the scene, such as ``name`` and ``split``.
     - ``suffix``: of the views' files, such as .png. Without it, each view has its best file.
@@ -301,8 +335,17 @@ class OpenDataset:
         has_flow = any(view.flow for view in self.lightfield.views)
         return [*names, FLOW.name] if has_flow else names
 
+    def require_pass(self, name: str) -> None:
+        """Raise `UserError` if the views do not have this pass."""
+        if name not in self.passes:
+            raise UserError(
+                f"{self.lightfield.path}: passes: has no {name!r}; it has "
+                f"{', '.join(self.passes) or 'none'}"
+            )
+
     def names(self, name: str) -> dict[str, int]:
         """Return the numbers in a pass of ids by the names that they stand for."""
+        self.require_pass(name)
         with self.files.on_disk(str(PurePosixPath(self.folders[0], name, NAMES))) as file:
             names: dict[str, int] = read_json(file)
         return names
@@ -331,12 +374,11 @@ class OpenDataset:
         return OpenViews(view for view in self.views if (view.split or "train") == part)
 
     @cached_property
-    def reprojections(self) -> "dict[str, OpenDataset]":
+    def reprojections(self) -> Reprojections:
         """The same views through other lenses, by the reprojections' names."""
-        if self.reprojection:
-            return {}
-        names = self.files.datasets_in(self.folders[0])
-        return {name: replace(self, reprojection=name) for name in names}
+        names = [] if self.reprojection else self.files.datasets_in(self.folders[0])
+        place = self.files.place(str(self.folder))
+        return Reprojections(place, {name: replace(self, reprojection=name) for name in names})
 
     @property
     def folder(self) -> PurePosixPath:
@@ -349,6 +391,14 @@ class OpenDataset:
         folder = PurePosixPath(self.folders[0], images.folder)
         suffixes = (self.suffix,) if self.suffix else images.suffixes
         return [f"{folder / view}{suffix}" for suffix in suffixes]
+
+
+def _pass_named(name: str) -> Pass:
+    try:
+        return FLOW if name == FLOW.name else passes.by_name(name)
+    except KeyError:
+        names = ", ".join([*passes.PASSES, FLOW.name])
+        raise UserError(f"passes: has no {name!r}; there are {names}") from None
 
 
 # Every view of a dataset has the same lens, and its rays take as much memory as six pictures.

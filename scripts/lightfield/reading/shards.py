@@ -1,14 +1,16 @@
 """Reads WebDataset shards as datasets: finds each view's files by the JSON of its sample."""
 
 import json
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from lightfield.core.errors import UserError
 from lightfield.core.files import reading
 from lightfield.formats import passes
-from lightfield.formats.layout import IMAGES, OTHER_FILES
+from lightfield.formats.layout import IMAGES, OTHER_FILES, SUMS, read_sums
 from lightfield.formats.lightfield import NAME, OMNIDIRECTIONAL
 from lightfield.formats.passes import FLOW
 from lightfield.reading.files import Packed, PackedFile, members_of
@@ -17,6 +19,10 @@ from lightfield.reading.files import Packed, PackedFile, members_of
 _OF_LENS = ("camera", "resolution", "sensor_size", "depth", OMNIDIRECTIONAL)
 # The keys of a sample of a family that corpus.json has, too.
 _OF_MEMBER = ("values", "split")
+
+
+# A shard's name: garden_ring-train-00000.tar.
+_NUMBERED = re.compile(r"(.+-)(\d+)\.tar")
 
 
 @dataclass
@@ -39,6 +45,45 @@ class _DatasetInShards:
     contents: dict[str, PackedFile | bytes] = field(default_factory=dict)
     shown: dict[str, _ShownViews] = field(default_factory=dict)
     member: dict[str, Any] = field(default_factory=dict)
+
+
+def check_complete(shards: Iterable[Path]) -> None:
+    """Raise `UserError` if shards are missing in the folders of these ``shards``.
+
+    The checksums of published shards, and of a family, list all of them. Without checksums, the
+    shards of a run are numbered from 0 without gaps.
+    """
+    names: dict[Path, set[str]] = {}
+    for shard in shards:
+        names.setdefault(shard.parent, set()).add(shard.name)
+    for folder, present in names.items():
+        if missing := sorted(_expected(folder, present) - present):
+            raise UserError(
+                f"{folder}: misses {', '.join(missing)}; copy them, or open the others by their "
+                "names"
+            )
+
+
+def _expected(folder: Path, present: Iterable[str]) -> set[str]:
+    """Return the names of the shards that must lie beside those ``present``."""
+    expected = set()
+    for name in {*present, *_listed(folder)}:
+        if shard := _NUMBERED.fullmatch(name):
+            run, last = shard.groups()
+            expected |= {f"{run}{number:0{len(last)}}.tar" for number in range(int(last) + 1)}
+    return expected
+
+
+def _listed(folder: Path) -> Iterator[str]:
+    """Yield the names of the files in ``folder`` that checksums list.
+
+    Published shards have their checksums beside them, and a family has them above shards/<part>.
+    """
+    for sums in (folder / SUMS, folder.parent.parent / SUMS):
+        if sums.is_file():
+            with reading(sums, "list of checksums"):
+                paths = [sums.parent / name for name in read_sums(sums)]
+            yield from (path.name for path in paths if path.parent == folder)
 
 
 def read_shards(

@@ -9,7 +9,7 @@ import numpy as np
 
 from lightfield.core import units
 from lightfield.core.files import absolute_path
-from lightfield.core.names import MESH, SPLITS
+from lightfield.core.names import MESH, SEQUENCE_PAGE, SPLITS
 from lightfield.engine.read_files import check_since_plan
 from lightfield.exporters import EXPORTERS, lists_beside_views
 from lightfield.formats import blend
@@ -82,6 +82,7 @@ def write(job: ReportHtml) -> None:
         lights=lights,
         frames=list(rig.sequence.folders) if rig.sequence else [],
         frame=absolute_path(folder).name,
+        sequence_page=SEQUENCE_PAGE,
         passes=list(pass_pictures.collect(middle, packed.data["exposure"], look)),
         reprojected=list(_reprojected(folder, lightfield, rig)),
         render=lightfield.render,

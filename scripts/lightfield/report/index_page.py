@@ -1,23 +1,25 @@
 """The index of all datasets: a page that links the page of each, and of each corpus."""
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, reading
-from lightfield.core.names import CORPUS
+from lightfield.core.names import CORPUS, SEQUENCE_PAGE
 from lightfield.core.paths import files_below, inside
 from lightfield.engine import receipts
-from lightfield.formats.layout import REPORT
+from lightfield.formats.layout import REPORT, VALIDATION
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report import page, tables
 from lightfield.stages.report import ReportIndex
+from lightfield.validation.sequence import frame_folders
 
 THUMBNAIL = 480
 _PAGE = (REPORT, "index.html")
+_SEQUENCE_PAGE = (REPORT, SEQUENCE_PAGE)
 
 
 def write(job: ReportIndex) -> None:
@@ -44,10 +46,20 @@ def write(job: ReportIndex) -> None:
 
 
 def _pages(results: Path, corpora: Iterable[Path]) -> Iterator[Path]:
-    """Yield the pages of datasets, but of members of families: a family's own page has them."""
+    """Yield the pages of datasets and sequences.
+
+    Leaves out members of families, and frames of sequences: the page of a family or of a sequence
+    has them.
+    """
     for path in files_below(results, strict=False):
-        if path.parts[-2:] == _PAGE and not any(path.is_relative_to(each) for each in corpora):
+        is_page = path.parts[-2:] in (_PAGE, _SEQUENCE_PAGE)
+        if is_page and not _is_frame(path) and not any(map(path.is_relative_to, corpora)):
             yield path
+
+
+def _is_frame(page_path: Path) -> bool:
+    """Return whether a page is of a frame of a sequence that has a page of its own."""
+    return page_path.parents[2].joinpath(*_SEQUENCE_PAGE).is_file()
 
 
 def _family(results: Path, folder: Path) -> dict[str, Any]:
@@ -69,22 +81,33 @@ def _family(results: Path, folder: Path) -> dict[str, Any]:
 
 
 def _entry(results: Path, path: Path) -> dict[str, Any]:
-    """Return the index's entry for the dataset whose page is at ``path``."""
+    """Return the index's entry for the dataset or the sequence whose page is at ``path``.
+
+    Raises `UserError` for a sequence without frames.
+    """
     folder = path.parents[1]
-    lightfield = LightField.read(folder / NAME)
+    is_sequence = path.name == SEQUENCE_PAGE
+    frames = [folder / name for name in frame_folders(folder)] if is_sequence else [folder]
+    if not frames:
+        raise UserError(f"{path}: is the page of a sequence, but no frames are beside it")
+    middle = frames[len(frames) // 2]
+    lightfield = LightField.read(middle / NAME)
     scene, *rig = folder.relative_to(results).parts
-    validation = tables.validation(folder / "validation.json")
-    state = "not validated"
-    if validation:
-        state = "valid" if validation["valid"] else "not valid"
     return {
         "scene": scene,
         "rig": "/".join(rig),
         "link": quote(path.relative_to(results).as_posix()),
-        "views": len(lightfield.views),
+        "frames": len(frames) if is_sequence else None,
+        "views": len(frames) * len(lightfield.views),
         "resolution": f"{lightfield.lens.width} × {lightfield.lens.height}",
         "lens": lightfield.lens.description,
         "projection": lightfield.lens.title,
-        "state": state,
-        "picture": page.photo(path.parent / "overview.png", THUMBNAIL),
+        "state": _state(frames),
+        "picture": page.photo(middle / REPORT / "overview.png", THUMBNAIL),
     }
+
+
+def _state(folders: Sequence[Path]) -> str:
+    """Return the state of a dataset, or the worst state of a sequence's frames."""
+    states = [tables.state(folder / VALIDATION) for folder in folders]
+    return next((state for state in ("not valid", "not validated") if state in states), "valid")

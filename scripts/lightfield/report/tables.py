@@ -64,6 +64,14 @@ def validation(path: Path) -> dict[str, Any] | None:
         raise UserError(f"{path}: is not what scripts/validate.py writes") from None
 
 
+def state(path: Path) -> str:
+    """Return what validation.json says of a dataset: valid, not valid, or not validated."""
+    content = validation(path)
+    if content is None:
+        return "not validated"
+    return "valid" if content["valid"] else "not valid"
+
+
 def reprojection(files: Sequence[Path]) -> Measurement | None:
     """Return the error of reprojection against its run time: the best methods of each case."""
     path = _named(files, "reprojection.csv")

@@ -150,6 +150,6 @@ class Status(PlainStage):
         [],
         metavar="NAME",
     )
-    family: list[tuple[str, AtLeastOne]] = option(
-        "a family: its folder, and its number of members", [], metavar=("NAME", "MEMBERS")
+    family: list[tuple[str, str]] = option(
+        "a family: its folder, and its scene YAML's name", [], metavar=("FOLDER", "SCENE")
     )

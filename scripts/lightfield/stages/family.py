@@ -13,7 +13,7 @@ from lightfield.configuration.shown_look import ShownLook
 from lightfield.core.names import scene_folder
 from lightfield.core.paths import files_below
 from lightfield.engine.receipts import FOLDER
-from lightfield.engine.stage import Stage, cause, option, reads, writes
+from lightfield.engine.stage import PlainStage, Stage, cause, option, reads, writes
 from lightfield.settings.base import ReaderSettings, Settings
 from lightfield.settings.types import AtLeastOne
 from lightfield.stages.views import Device
@@ -77,6 +77,9 @@ class CorpusSettings(CorpusOptions, ReaderSettings):
         "a record.",
     )
     look: ShownLook | None = Field(None, description="Look of the thumbnails.")
+    description: str | None = Field(None, description="Description of the members, in one line.")
+    licence: str | None = Field(None, description="Licence of the scene and of the data.")
+    credit: str | None = Field(None, description="How to cite the artist of the scene.")
 
 
 class Corpus(Stage[CorpusSettings]):
@@ -109,3 +112,18 @@ class CountMembers(Stage[CountSettings]):
     corpus: Path = reads("corpus.json of the family")
     failed: Path = writes("text file to write: the failed members, with their errors")
     output: Path = writes("JSON to write if no member failed")
+
+
+class Prune(PlainStage):
+    """Removes the members and datasets that families no longer have."""
+
+    name = "prune"
+    function = "lightfield.family.prune:prune"
+
+    results: Path = option("folder of the datasets")
+    work: Path = option("folder of intermediate files, with the receipts of the members")
+    family: list[tuple[str, str]] = option(
+        "a family: its folder in the folder of the datasets, and its scene YAML's name",
+        [],
+        metavar=("FOLDER", "SCENE"),
+    )

@@ -234,6 +234,7 @@ class ErrorVsTime(CalibratedTrialStage[ErrorVsTimeSettings]):
 
     name = "error_vs_time"
     function = "lightfield.measurement.error_vs_time:make"
+    version = 1
     by_hand = ErrorVsTimeSettings
 
     output: Path = writes("path without suffix of the .csv, .json, .md, .svg and .png to write")

@@ -85,7 +85,7 @@ class Package(Stage[PackSettings]):
     """Packs a finished dataset as tar archives with a card."""
 
     name = "package"
-    version = 2
+    version = 3
     function = "lightfield.publishing.package:write"
     by_hand = PackageByHand
 
@@ -97,7 +97,7 @@ class Publish(Stage[PackSettings]):
     """Writes a finished dataset as WebDataset shards, with descriptions of them."""
 
     name = "publish"
-    version = 2
+    version = 3
     function = "lightfield.publishing.publish:write"
     by_hand = PublishByHand
 

@@ -70,13 +70,34 @@ class ReportHtml(Stage[PageSettings]):
 
     name = "report_html"
     function = "lightfield.report.dataset_page:write"
-    version = 3
+    version = 4
 
     dataset: Path = reads("folder of the dataset")
     dataset_name: str = option("name of the dataset, scene/rig", flag="--name", metavar="NAME")
     inventory: Path | None = reads(
         "JSON that scripts/inventory.py wrote for the scene, if it is a user's .blend", None
     )
+    output: Path = writes("HTML file to write")
+
+
+class SequenceSettings(ReaderSettings):
+    """The settings of scripts/report_sequence.py."""
+
+    frames: list[str] = Field(
+        min_length=1, description="Names of the folders of the sequence's frames, in order of time."
+    )
+    rig: Annotated[AnyRig, PlainSerializer(as_written)] = Field(description="As in the scene YAML.")
+    look: ShownLook | None = Field(None, description="Look of the page's pictures.")
+
+
+class ReportSequence(Stage[SequenceSettings]):
+    """Makes a sequence's page: one file that shows and plays its frames."""
+
+    name = "report_sequence"
+    function = "lightfield.report.sequence_page:write"
+
+    rig: Path = reads("folder of the rig, which holds the folders of the frames")
+    rig_name: str = option("name of the rig, scene/rig", flag="--name", metavar="NAME")
     output: Path = writes("HTML file to write")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, sha256
 from lightfield.formats.export_lists import IN_FOLDERS, MANIFEST
-from lightfield.formats.layout import FRAME_FOLDERS
+from lightfield.formats.layout import FRAME_FOLDERS, REPORT
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
@@ -97,7 +97,7 @@ def _owned(rig: Path, path: Path) -> list[str]:
 
 def _strays(rig: Path, frames: Collection[str], owned: Collection[str]) -> list[str]:
     """Return the files in a rig's folder that are of no frame and of no export."""
-    return strays_among(rig, present_files(rig, frames), owned)
+    return strays_among(rig, present_files(rig, {*frames, REPORT}), owned)
 
 
 def _first_frame(rig: Path, path: Path, folders: Sequence[str]) -> LightField:

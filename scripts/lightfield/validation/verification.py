@@ -8,13 +8,23 @@ lists of its datasets.
 
 import os
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from lightfield.configuration.corpus import SHARDS, THUMBNAILS
 from lightfield.configuration.family import RECORD
 from lightfield.core.errors import UserError
-from lightfield.core.files import absolute_path, broken, read_json, read_problem, set_aside, sha256
+from lightfield.core.files import (
+    DAMAGE,
+    absolute_path,
+    broken,
+    read_json,
+    read_problem,
+    set_aside,
+    sha256,
+)
 from lightfield.core.names import CORPUS
 from lightfield.core.paths import (
     files_below,
@@ -31,6 +41,7 @@ from lightfield.stages.checks import Verify
 
 CHANGED = "has changed since a job read it"
 STRAY = "is not a file of this dataset, or has no checksum"
+FORMER = f"is not in {CORPUS} any more; snakemake prune removes it where the family is built"
 
 
 def verify(job: Verify) -> None:
@@ -200,9 +211,7 @@ class _Verification:
         """Check that the list of a copy has what a corpus or a valid dataset must have."""
         sums, validation, lightfield = home / SUMS, home / VALIDATION, home / NAME
         if self._is_corpus(home):
-            for path in (str(each / SUMS) for each in self.homes[1:]):
-                if path not in self.listed:
-                    self.problems[path] = f"has no checksum in {sums}"
+            self._check_members(home)
             return
         # A sequence has no light field of its own.
         required = [validation, *([lightfield] if lightfield.exists() else [])]
@@ -211,6 +220,23 @@ class _Verification:
                 self.problems[str(validation)] = "says that the dataset is not valid"
             views = LightField.read(lightfield).views if lightfield in required else []
             self._are_listed([home / IMAGES / f"{view.name}.exr" for view in views], sums)
+
+    def _check_members(self, home: Path) -> None:
+        """Check that the list of a corpus has all datasets. Name what is no part of it any more."""
+        members = _members_of_corpus(home)
+        for dataset in self.homes[1:]:
+            name, *rig = dataset.relative_to(home).parts
+            sums = str(dataset / SUMS)
+            member = members.get(name, {})
+            if members and not member:
+                self.problems[str(home / name)] = FORMER
+            elif member.get("state") == "failed" and not os.path.lexists(sums):
+                # It keeps its whole files, so that a later run need not make them again.
+                self.problems.pop(sums, None)
+            elif member and "/".join(rig) not in member.get("datasets", {}):
+                self.problems[str(dataset)] = FORMER
+            elif sums not in self.listed:
+                self.problems[sums] = f"has no checksum in {home / SUMS}"
 
     def _are_listed(self, required: Iterable[Path], sums: Path) -> bool:
         """Return whether files are in a list. The first that is not is a fault of the list."""
@@ -245,6 +271,13 @@ class _Verification:
 
     def _is_corpus(self, home: Path) -> bool:
         return str(home / CORPUS) in self.listed or (home / CORPUS).exists()
+
+
+def _members_of_corpus(home: Path) -> dict[str, dict[str, Any]]:
+    """Return the members in corpus.json by name. Empty if it is missing or damaged."""
+    with suppress(UserError, *DAMAGE):
+        return {member["name"]: member for member in read_json(home / CORPUS)["members"]}
+    return {}
 
 
 def _homes(folder: Path, present: Iterable[str]) -> list[Path]:

@@ -39,9 +39,8 @@ def status_arguments(plan: JobPlan) -> Callable[[HasWildcards], str]:
             words += ["--dataset", dataset.name, str(dataset.view_count), reprojections]
             if plan.is_outdated(dataset):
                 words += ["--outdated", dataset.name]
-        for folder, batches in plan.run.build.batches.items():
-            members = sum(map(len, batches.values()))
-            words += ["--family", folder, str(members)]
+        for folder, scene in plan.run.build.family_names.items():
+            words += ["--family", folder, scene]
         return shlex.join(words)
 
     return arguments

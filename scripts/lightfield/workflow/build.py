@@ -32,6 +32,8 @@ from lightfield.planning.loading import (
 
 Wildcards = Mapping[str, str]
 Entry = TypeVar("Entry")
+Batches = Mapping[str, Mapping[str, list[Member]]]
+"""The members of each batch of each family, by the folder of the family."""
 SMOKE = "smoke"
 INVENTORY = "inventory.json"
 
@@ -53,13 +55,14 @@ class Build:
 
     The run makes the ``chosen`` datasets. ``datasets`` maps names to all datasets. Some of them
     only test models that were trained on chosen ones. ``families`` maps the names of scene YAMLs to
-    the chosen families.
+    the chosen families. ``batches`` has their members.
     """
 
     config: Configuration
     chosen: list[Dataset]
     datasets: dict[str, Dataset]
     families: dict[str, Family]
+    batches: Batches
 
     @classmethod
     def load(cls, config: Configuration, cluster: Cluster | None = None) -> "Build":
@@ -71,7 +74,8 @@ class Build:
         with suppress(UserError):
             smoke = scene_datasets(SMOKE, settings=config, cluster=cluster)
         datasets = {dataset.name: dataset for dataset in [*smoke, *every_rig]}
-        return cls(config, chosen, datasets, chosen_families(config))
+        families = chosen_families(config)
+        return cls(config, chosen, datasets, families, _batches(config, families))
 
     @cached_property
     def smoke(self) -> list[Dataset]:
@@ -125,20 +129,20 @@ class Build:
         folder = f"{dataset.paths.folder}/exports"
         return _entry(dataset.exports.selected, wildcards["format"], folder, "export of it")
 
-    def testing(self, dataset: Dataset, export: Export) -> list[Dataset]:
-        """Return the datasets whose views go into an ``export`` of a dataset, to test with."""
-        rigs = dataset.testing_rigs(export)
+    def beside(self, dataset: Dataset, export: Export) -> list[Dataset]:
+        """Return the other datasets whose views go into an ``export`` of a dataset."""
+        rigs = dataset.rigs_beside(export)
         return [self.datasets[f"{dataset.scene_folder}/{rig}"] for rig in rigs]
 
     def exported_views(self, wildcards: Wildcards) -> list[str]:
-        """Return the inputs of an export: the views of its dataset, and of its test datasets.
+        """Return the inputs of an export: the views of its dataset, and of other rigs.
 
         Points follow from the depth of the rendered views, for any source.
         """
         dataset = self.dataset(wildcards)
         files = [*dataset.receipts(RENDERED), *dataset.receipts(shards_of(wildcards))]
-        for test in self.testing(dataset, self.export(wildcards)):
-            files += _views_of_source(test, wildcards)
+        for other in self.beside(dataset, self.export(wildcards)):
+            files += _views_of_source(other, wildcards)
         return list(dict.fromkeys(files))
 
     def training_lists(self, wildcards: Wildcards) -> list[str]:
@@ -167,12 +171,14 @@ class Build:
         """
         frames = [dataset for dataset in self.rig(wildcards) if dataset.rig.sequence]
         export_format = wildcards.get("format")
-        if not frames or (export_format and export_format not in frames[0].exports.selected):
-            name = f"{wildcards['scene']}/{wildcards['rig']}"
+        folder = f"{self.config.results}/{wildcards['scene']}/{wildcards['rig']}"
+        if export_format and not (frames and export_format in frames[0].exports.selected):
             raise UserError(
-                f"{self.config.results}/{name}/exports/{export_format}: the scene YAML asks for "
-                "no such export of a sequence"
+                f"{folder}/exports/{export_format}: the scene YAML asks for no such export of a "
+                "sequence"
             )
+        if not frames:
+            raise UserError(f"{folder}: is no sequence; its rig in the scene YAML has no frames")
         return frames
 
     def exported_frames(self, wildcards: Wildcards) -> list[str]:
@@ -180,23 +186,41 @@ class Build:
         files = []
         for frame in self.frames(wildcards):
             export = frame.exports.selected[wildcards["format"]]
-            for dataset in (frame, *self.testing(frame, export)):
+            for dataset in (frame, *self.beside(frame, export)):
                 files += _views_of_source(dataset, wildcards)
         return list(dict.fromkeys(files))
 
     def validated_frames(self, wildcards: Wildcards) -> list[str]:
         """Return the files with which exports of a sequence are compared: the views of all frames.
 
-        Views of other rigs may test what these train. Their lightfield.json has their poses.
+        Exports may have views of other rigs. Their lightfield.json has their poses.
         """
         files = []
         for frame in self.frames(wildcards):
             files += [*frame.all_receipts, *frame.lightfields]
             for export in frame.exports.selected.values():
                 if export.is_of_sequence:
-                    for test in self.testing(frame, export):
-                        files += test.lightfields
+                    for other in self.beside(frame, export):
+                        files += other.lightfields
         return list(dict.fromkeys(files))
+
+    def shown_frames(self, wildcards: Wildcards) -> list[str]:
+        """Return the files that the page of a sequence shows: the views of all frames."""
+        files = []
+        for frame in self.frames(wildcards):
+            paths = frame.paths
+            files += [*frame.receipts(RENDERED), paths.lightfield, paths.validation]
+        return files
+
+    @property
+    def pages(self) -> list[str]:
+        """The pages of the chosen datasets and sequences."""
+        pages = []
+        for dataset in self.chosen:
+            pages.append(dataset.paths.page)
+            if dataset.sequence_page:
+                pages.append(dataset.sequence_page)
+        return list(dict.fromkeys(pages))
 
     def sequence_exports(self, wildcards: Wildcards) -> list[str]:
         """Return the lists of the exports of a sequence."""
@@ -215,6 +239,18 @@ class Build:
         return [
             (name, len(frames), frames[0].paths.probe) for name, frames in frames_of_rig.items()
         ]
+
+    def packages(self, wildcards: Wildcards) -> list[str]:
+        """Return the packages of the chosen datasets, and the documents beside them.
+
+        Raises `UserError` if only families are chosen, which have no packages.
+        """
+        if not self.chosen:
+            raise UserError(
+                f"package: {' and '.join(self.families)}: a family has no packages; its corpus is "
+                "published as it is, see docs/how-to/use-a-corpus.md"
+            )
+        return [*(dataset.sequence_paths.package for dataset in self.chosen), *self.documents]
 
     @property
     def documents(self) -> list[str]:
@@ -301,20 +337,6 @@ class Build:
         """The names of the chosen families, by their folders."""
         return {scene_folder(name, self.config.preset): name for name in self.families}
 
-    @cached_property
-    def batches(self) -> dict[str, dict[str, list[Member]]]:
-        """The members of each batch of each family, by the folder of the family.
-
-        Raises `UserError` for a family without members.
-        """
-        batches = {}
-        for folder, name in self.family_names.items():
-            try:
-                batches[folder] = self.families[name].batches()
-            except UserError as error:
-                raise mistake(name, str(error)) from None
-        return batches
-
     @property
     def batch_count(self) -> int:
         """The number of batches of all families."""
@@ -376,6 +398,17 @@ class Build:
         """The files that a run with families makes."""
         counts = [f"{self.config.work}/{folder}/members.json" for folder in self.family_names]
         return self.corpora + counts
+
+
+def _batches(config: Configuration, families: Mapping[str, Family]) -> Batches:
+    """Return the batches of families. Raises `UserError` for a family without members."""
+    batches = {}
+    for name, family in families.items():
+        try:
+            batches[scene_folder(name, config.preset)] = family.batches()
+        except UserError as error:
+            raise mistake(name, str(error)) from None
+    return batches
 
 
 @cache

@@ -20,16 +20,28 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lightfield.configuration.dataset import Dataset
+from lightfield.configuration.scene_yaml import load_scene
 from lightfield.core.disk_space import check_folder
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, set_aside, special_kind, unreadable, write_text
 from lightfield.engine import receipts
 from lightfield.engine.receipts import SUFFIX, make_way
+from lightfield.formats.layout import SUMS
+from lightfield.planning.phases import CHANGE_DATASETS
 from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import presence, run_lock
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.check import JobCheck
-from lightfield.workflow.jobs import BUILD_MEMBERS, FIGURES, LIGHTFIELD, PAGE, RENDER, Job
+from lightfield.workflow.jobs import (
+    BUILD_MEMBERS,
+    FIGURES,
+    LIGHTFIELD,
+    PAGE,
+    RENDER,
+    SEQUENCE_PAGE,
+    Job,
+)
+from lightfield.workflow.member_record import former_places
 from lightfield.workflow.run import HasWildcards, Run, one_of
 from lightfield.workflow.run_config import ending_run
 
@@ -185,6 +197,8 @@ class JobPlan:
             written.append(f"{paths.views}/{{first}}")
         elif job in (FIGURES, PAGE):
             written.append(paths.page)
+        elif job is SEQUENCE_PAGE:
+            written.append(paths.sequence_page)
         return [os.path.dirname(path.format(**names)) for path in written]  # noqa: PTH120
 
     def _end_unless_writable(self, folder: str) -> None:
@@ -282,6 +296,15 @@ class JobPlan:
             for batch in batches
         ]
 
+    def former_places(self, family: str) -> list[str]:
+        """Return the folders of members and datasets that a family no longer has."""
+        build = self.run.build
+        names = {member.name for batch in build.batches[family].values() for member in batch}
+        rigs = load_scene(build.family_names[family]).rigs
+        return former_places(
+            Path(self.run.results, family), Path(self.receipts, family), names, rigs
+        )
+
     def receipt_path(self, job: str) -> str:
         return f"{self.receipts}/{job}{SUFFIX}"
 
@@ -311,6 +334,19 @@ class JobPlan:
         special = [Path(path) for path in made if special_kind(path)]
         for path in locks + times + special:
             make_way(path, Path(self.run.work))
+
+    def withdraw_checksums(self) -> None:
+        """Remove the sha256sums.txt of each dataset whose files this run changes.
+
+        Only a valid dataset has this file. If the run stops half way, or ends before validation,
+        the dataset is not valid.
+        """
+        for planned in self.planned_jobs():
+            if planned.job.phase in CHANGE_DATASETS and "rig" in planned.names:
+                dataset = Path(self.run.results, planned.names["scene"], planned.names["rig"])
+                # A frame's files also belong to its sequence.
+                for folder in (dataset, dataset.parent):
+                    (folder / SUMS).unlink(missing_ok=True)
 
     # What a plan says of files that are made again.
 
@@ -394,6 +430,13 @@ class JobPlan:
         """Return the command that verifies all folders. Without any, it does nothing."""
         folders = shlex.join(self.run.build.verified_folders)
         return f"python {self.run.scripts}/verify.py {folders} --work {self.run.work}"
+
+    def prune_command(self, wildcards: HasWildcards) -> str:
+        """Return the command that removes what the chosen families no longer have."""
+        run = self.run
+        families = [w for names in run.build.family_names.items() for w in ("--family", *names)]
+        folders = f"--results {run.results} --work {run.work}"
+        return f"python {run.scripts}/prune.py {folders} {shlex.join(families)}"
 
     def check_provider(self, path: str) -> None:
         """End the run if Snakemake has a storage, as its ``path`` of an output tells."""

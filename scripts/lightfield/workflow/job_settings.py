@@ -42,7 +42,12 @@ from lightfield.stages.measurement import (
     SynthesisSettings,
 )
 from lightfield.stages.publishing import PackSettings
-from lightfield.stages.report import FiguresSettings, MeasurementFile, PageSettings
+from lightfield.stages.report import (
+    FiguresSettings,
+    MeasurementFile,
+    PageSettings,
+    SequenceSettings,
+)
 from lightfield.stages.rig import FreePlacesSettings
 from lightfield.stages.scene import (
     BuildSettings,
@@ -347,7 +352,7 @@ def export(dataset: Dataset, options: Export, source: str) -> ExportSettings[Exp
     # In a sequence the frame's folder follows the rig's name.
     folders = {
         rig.partition("/")[0]: replace(dataset.paths, rig=rig).folder
-        for rig in dataset.testing_rigs(options)
+        for rig in dataset.rigs_beside(options)
     }
     training_list = dataset.training_list(options, source)
     return _export_settings(dataset, options, source, tested_by=folders, trained_by=training_list)
@@ -379,12 +384,12 @@ def export_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     frames = build.frames(wildcards)
     first = frames[0]
     options = first.exports.selected[name]
-    tests = build.testing(first, options)
+    others = build.beside(first, options)
     settings = _export_settings(
         first,
         options,
         source,
-        tested_by={test.rig_name: test.sequence_paths.folder for test in tests},
+        tested_by={other.rig_name: other.sequence_paths.folder for other in others},
         frames=[Path(frame.paths.folder).name for frame in frames],
     )
     return f"exports/{source}/{name}", settings
@@ -397,6 +402,16 @@ def validate_sequence(build: Build, wildcards: Wildcards) -> tuple[str, Settings
         exports=frames[0].sequence_exports,
     )
     return "validate", settings
+
+
+def sequence_page(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
+    frames = build.frames(wildcards)
+    settings = SequenceSettings.of(
+        frames=[Path(frame.paths.folder).name for frame in frames],
+        rig=frames[0].placed_rig,
+        look=frames[0].shown_look,
+    )
+    return "sequence_page", settings
 
 
 def probes(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
@@ -478,5 +493,13 @@ def corpus(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     members = [member.name for batch in build.batches[folder].values() for member in batch]
     scene = load_scene(build.family_names[folder])
     look = shown_look(scene.developments.values(), scene.exports.selected.values())
-    settings = CorpusSettings.of(**dict(options), family=folder, members=sorted(members), look=look)
+    settings = CorpusSettings.of(
+        **dict(options),
+        family=folder,
+        members=sorted(members),
+        look=look,
+        description=scene.description,
+        licence=scene.licence,
+        credit=scene.credit,
+    )
     return "corpus", settings

@@ -374,6 +374,16 @@ PAGE = Job(
     times="{scene}/{rig}/report/page",
     is_local=True,
 )
+SEQUENCE_PAGE = Job(
+    "{scene}/{rig}/frames_page",
+    report.ReportSequence,
+    "report",
+    lambda build, names: cost.drawing_frames(build.frames(names)),
+    of_others(settings.sequence_page),
+    times="{scene}/{rig}/report/frames_page",
+    is_of_sequence=True,
+    is_local=True,
+)
 INDEX = Job("index", report.ReportIndex, "report", _costs(JOB), is_local=True)
 PACK = Job(
     "{scene}/{rig}/package",

@@ -7,12 +7,12 @@ view counts if lightfield.json itself is outdated: only the workflow can tell.
 
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lightfield.configuration import keys
+from lightfield.configuration import keys, scene_yaml
 from lightfield.configuration.family import RECORD
 from lightfield.core import units
 from lightfield.core.errors import UserError
@@ -21,7 +21,7 @@ from lightfield.core.names import RENDERED
 from lightfield.core.units import duration
 from lightfield.engine import receipts
 from lightfield.engine.receipts import FOLDER, Output
-from lightfield.formats.layout import IMAGES, VALIDATION
+from lightfield.formats.layout import IMAGES, SUMS, VALIDATION
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Status
 from lightfield.workflow import history
@@ -35,7 +35,9 @@ _SILENCE = 3600.0
 
 def show(job: Status) -> None:
     """Print the progress of families, of datasets, and of all datasets together."""
-    for name, members in job.family:
+    for name, scene in job.family:
+        family = scene_yaml.family_of(scene)
+        members = {member.name for member in family.members()} if family else set()
         print(of_family(name, job.results / name, members))
     if job.dataset:
         _show_datasets(job)
@@ -60,16 +62,20 @@ def _show_datasets(job: Status) -> None:
     print(f"all: {done} of {total} views rendered{outlook(total - done, recent, seconds)}")
 
 
-def of_family(name: str, folder: Path, count: int) -> str:
-    """Return the progress of a family of ``count`` members, whose folders are in ``folder``."""
+def of_family(name: str, folder: Path, members: Collection[str]) -> str:
+    """Return the progress of a family by the names of its ``members``, which are in ``folder``.
+
+    A former member, which the family no longer has, does not count as built.
+    """
     states = []
     for record in folder.glob(f"*/{RECORD}"):
         # A build may remove it meanwhile. A damaged one counts as missing.
         with suppress(UserError):
-            states.append(read_member(record.parent).state)
+            if record.parent.name in members:
+                states.append(read_member(record.parent).state)
     failed = states.count("failed")
     failures = f", {failed} failed" if failed else ""
-    return f"{name}: {states.count('valid')} of {count} members built{failures}"
+    return f"{name}: {states.count('valid')} of {len(members)} members built{failures}"
 
 
 @dataclass
@@ -229,4 +235,6 @@ def _validated(folder: Path, count: int, rendering: RenderProgress) -> str:
     problem = broken(path)
     if problem:
         return f"no: {path} {problem}, and is made anew"
-    return "yes" if read_json(path).get("valid") else f"yes, and it is not valid: see {path}"
+    if not read_json(path).get("valid"):
+        return f"yes, and it is not valid: see {path}"
+    return "yes" if (folder / SUMS).exists() else "not since its files changed"

@@ -212,6 +212,13 @@ class StoredPlan(JobPlan):
         take = f"python {run.scripts}/take_dataset.py --store {shlex.quote(self.url)}"
         return f"{take} --work {run.work} {folders}" if folders else ":"
 
+    def former_places(self, family: str) -> list[str]:
+        """Return nothing: the bundle of a batch has its present members alone."""
+        return []
+
+    def prune_command(self, wildcards: HasWildcards) -> str:
+        return "echo 'nothing to remove: a storage has only present members'"
+
     def check_provider(self, path: str) -> None:
         """End the run if Snakemake has no storage, as its ``path`` of an output tells."""
         if self.run.is_main and not is_in_storage(path):

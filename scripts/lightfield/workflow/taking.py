@@ -10,6 +10,7 @@ from pathlib import Path
 from lightfield.configuration.dataset_paths import REPORT_FILES
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_keys, reading, sha256
+from lightfield.core.names import SEQUENCE_PAGE
 from lightfield.core.paths import inside
 from lightfield.core.progress import Progress
 from lightfield.engine import bundles, receipts
@@ -26,9 +27,9 @@ def take_datasets(job: TakeDataset) -> None:
 
 
 def _take(storage: Storage, dataset: Path, work: str) -> None:
-    """Copy all files of a dataset, and its page."""
+    """Copy all files of a dataset or a sequence, and its page."""
     report = dataset / REPORT
-    for name in REPORT_FILES:
+    for name in (*REPORT_FILES, SEQUENCE_PAGE):
         storage.bring(str(report / name))
     listing, sums = _sums_of(storage, dataset, work)
     progress = Progress(len(sums), "take", "files")

@@ -17,7 +17,8 @@ _RIG = "setting rig"
 def unfinished_views(plan: JobPlan, planned: PlannedJob) -> int:
     """Return how many views of a job that renders a shard are not finished.
 
-    All of them, if the job may give them other keys. A new split does not, so their files stay.
+    All of them, if the job may give them other keys. A new split does not, nor do more views of a
+    random rig, so their files stay.
     """
     names = planned.names
     dataset = plan.run.asked(plan.run.build.dataset, names)
@@ -53,9 +54,14 @@ def _keep_their_keys(plan: JobPlan, dataset: Dataset) -> bool:
     if earlier is None or planned is None or planned.job.settings is None:
         return False
     _, wanted = planned.job.settings(plan.run.build, planned.names)
-    return _without_split(earlier.settings) == _without_split(wanted)
+    return _of_views(earlier.settings) == _of_views(wanted)
 
 
-def _without_split(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a rig without its split."""
-    return {key: value for key, value in settings["rig"].items() if key != "split"}
+def _of_views(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of a rig that place the views it has: without its split.
+
+    The number of views moves no camera of a random rig.
+    """
+    rig = settings["rig"]
+    left_out = {"split", "count"} if rig["type"] == "random" else {"split"}
+    return {key: value for key, value in rig.items() if key not in left_out}

@@ -1,5 +1,7 @@
 """Checks exports with the views that they read."""
 
+from collections.abc import Sequence
+
 from lightfield.configuration.scene_blocks import SceneBlocks, look_of
 from lightfield.configuration.scene_checks.names import check_rigs
 from lightfield.core.names import VIEWS
@@ -16,7 +18,9 @@ def check(blocks: SceneBlocks) -> None:
 
 def _check_export(blocks: SceneBlocks, export_key: str, export: Export) -> None:
     """Check that an export's rigs and sources exist, and that its consumer can take them."""
-    check_rigs(blocks, f"{export_key}.rigs", export.rigs or ())
+    rigs_key = f"{export_key}.{'together' if export.joined_rigs else 'rigs'}"
+    check_rigs(blocks, rigs_key, export.chosen_rigs or ())
+    _check_joined_rigs(blocks, rigs_key, export.joined_rigs)
     key = f"{export_key}.sources"
     developments = blocks.developments
     allowed_sources = [VIEWS, *developments]
@@ -44,19 +48,36 @@ def _check_export(blocks: SceneBlocks, export_key: str, export: Export) -> None:
                 f"{key}: {source} mixes the rows of a rolling shutter, whose times the export "
                 f"has; export {VIEWS}"
             )
-        _check_exported_rigs(blocks, export_key, export, source)
+        _check_exported_rigs(blocks, export_key, rigs_key, export, source)
 
 
-def _check_exported_rigs(blocks: SceneBlocks, export_key: str, export: Export, source: str) -> None:
+def _check_joined_rigs(blocks: SceneBlocks, key: str, names: Sequence[str]) -> None:
+    """Check that rigs can go into one export, which has one lens and one split."""
+    for name in names:
+        first, rig = blocks.rigs[names[0]], blocks.rigs[name]
+        if first.split in ("validation", "test"):
+            raise ValueError(f"{key}: begins with {names[0]}, which tests; name a rig that trains")
+        for setting in ("camera", "frames"):
+            if getattr(rig, setting) != getattr(first, setting):
+                raise ValueError(f"rigs.{name}.{setting}: must be as in {names[0]}; see {key}")
+        if (rig.split is None) != (first.split is None):
+            raise ValueError(
+                f"{key}: only one of {names[0]} and {name} has a split; give both a split, or none"
+            )
+
+
+def _check_exported_rigs(
+    blocks: SceneBlocks, export_key: str, rigs_key: str, export: Export, source: str
+) -> None:
     """Check that an export's consumer can take the views of each chosen rig of a source."""
     reprojection = blocks.developments.get(source)
     rigs_of_source = (reprojection and reprojection.rigs) or [*blocks.rigs]
-    for name in export.rigs or ():
+    for name in export.chosen_rigs or ():
         if name not in rigs_of_source:
-            raise ValueError(f"{export_key}.rigs: {name} is not a rig of the reprojection {source}")
+            raise ValueError(f"{rigs_key}: {name} is not a rig of the reprojection {source}")
     refusals = {
         name: _export_refusal(blocks, export, blocks.rigs[name], source)
-        for name in export.rigs or rigs_of_source
+        for name in export.chosen_rigs or rigs_of_source
     }
     accepted = ", ".join(name for name, refusal in refusals.items() if not refusal)
     for name, refusal in refusals.items():

@@ -26,7 +26,8 @@ def check(blocks: SceneBlocks) -> None:
         _check_whole_split(blocks, f"{key}.rigs", split_rigs.keys(), reprojection.rigs)
     for name, export in blocks.exports.selected.items():
         if export.joins_split:
-            _check_whole_split(blocks, f"exports.{name}.rigs", split_rigs.keys(), export.rigs)
+            key = f"exports.{name}.{'together' if export.joined_rigs else 'rigs'}"
+            _check_whole_split(blocks, key, split_rigs.keys(), export.chosen_rigs)
 
 
 def _check_whole_split(

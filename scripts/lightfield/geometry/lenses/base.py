@@ -107,10 +107,13 @@ class LensSettings(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class Lens(ABC):
-    """A projection on an image of ``width`` × ``height`` pixels.
+    """A projection on an image.
 
-    ``sensor_size`` is in mm (default: 36 wide, square pixels), ``principal_point`` in pixels
-    (default: the image's centre).
+    - ``width``: the image's width in pixels.
+    - ``height``: the image's height in pixels.
+    - ``sensor_size``: the sensor's width and height in mm. By default, it is 36 mm wide, and pixels
+      are square.
+    - ``principal_point``: in pixels. By default, it is the image's centre.
 
     The class of each lens defines:
 
@@ -156,6 +159,20 @@ class Lens(ABC):
     def center(self) -> Pair:
         """The principal point in pixels."""
         return self.principal_point or (self.width / 2, self.height / 2)
+
+    @property
+    def K(self) -> npt.NDArray[np.float64]:  # noqa: N802, its name everywhere
+        """The intrinsic matrix (3, 3) of a perspective lens, in pixels.
+
+        K (x, y, z) = z (column, row, 1), with x right, y down and z forward, as in OpenCV: y and z
+        are the negatives of this camera's. The first pixel's centre is (0.5, 0.5). For programs
+        whose first centre is (0, 0), such as OpenCV, subtract 0.5 from K[0, 2] and K[1, 2].
+        Raises `UserError` for all other lenses.
+        """
+        raise UserError(
+            f"K: no matrix describes this lens ({self.description}); use its rays and pixels, or a "
+            "perspective reprojection"
+        )
 
     @property
     def description(self) -> str:

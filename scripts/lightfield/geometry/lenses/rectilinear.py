@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
 from lightfield.core.errors import UserError
@@ -78,6 +79,11 @@ class Rectilinear(RadialLens):
     def __post_init__(self) -> None:
         super().__post_init__()
         checked_focal_length(self.focal_length)
+
+    @property
+    def K(self) -> npt.NDArray[np.float64]:  # noqa: N802
+        (across, down), (x, y) = self._unit, self.center
+        return np.array([[1 / across, 0, x], [0, 1 / down, y], [0, 0, 1]])
 
     @property
     def description(self) -> str:
