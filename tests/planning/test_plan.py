@@ -228,6 +228,37 @@ def test_a_plan_for_a_cluster_lists_what_jobs_request(tmp_path):
     assert "slurm_partition" not in here.stdout and "phase" in here.stdout
 
 
+def phases(folder, *arguments):
+    """Return the number of jobs of each phase in a plan of the smoke scene."""
+    plan = snakemake(folder, "-n", *arguments, "scenes=[smoke]", "preset=full")
+    assert plan.returncode == 0, plan.stderr
+    table = plan.stdout[plan.stdout.index("phase ") :].split("\n\n")[0]
+    return {phase: int(jobs) for phase, jobs, *_ in map(str.split, table.splitlines()[1:])}
+
+
+def test_a_plan_until_a_rule_counts_only_the_jobs_until_then(tmp_path):
+    folder = checkout(tmp_path / "plenoforge")
+    everything = phases(folder, "--config")
+    for rule, last in {"inventory": "scene", "render": "views", "reproject": "sensor"}.items():
+        counted = phases(folder, "--until", rule, "--config")
+        assert [*counted][-2:] == [last, "all"]
+        assert counted["all"] == sum(counted.values()) / 2 < everything["all"]
+    assert counted["views"] == everything["views"]
+
+
+def test_a_plan_with_a_storage_counts_all_jobs_and_lists_what_they_request(tmp_path):
+    everything = phases(checkout(tmp_path / "shared"), "--config")
+    store = tmp_path / "store"
+    options = ["--default-storage-provider", "fs", "--default-storage-prefix", str(store)]
+    options += ["--shared-fs-usage", "source-cache", "persistence"]
+    keys = ("--config", f"storage={store}", "cluster_jobs=10", "scenes=[smoke]", "preset=full")
+    plan = snakemake(checkout(tmp_path / "stored"), "-n", *options, *keys)
+    assert plan.returncode == 0, plan.stderr
+    rows = dict(line.split(maxsplit=1) for line in plan.stdout.splitlines() if line)
+    assert int(rows["all"].split()[0]) == everything["all"]
+    assert rows["validate"].split() == ["3", "1", "4,000", "120", "–", "–"]
+
+
 def test_ranges_of_requests_have_the_least_and_the_largest():
     requests = [
         Request("render", 16, {"mem_mb": memory, "runtime": 30, "gpu": 0})
