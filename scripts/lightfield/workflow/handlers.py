@@ -11,7 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from lightfield.configuration.dataset import Dataset
+from lightfield.configuration.dataset import SPEED_OF_GPU, Dataset
 from lightfield.core.terminal import was_interrupted
 from lightfield.core.units import count, duration
 from lightfield.planning.cost import JOB, Cost, estimate_of, rendering
@@ -46,9 +46,14 @@ MOST_NAMES = 5
 REQUESTS_NOTE = (
     "mem_mb is the memory of a job in MB, and runtime its time limit in minutes. – is the "
     "cluster's default.\n"
-    "A limit is several times the expected time. Jobs of seconds run beside Snakemake, and are "
-    "not listed.\n"
+    "A limit is several times the expected time. Jobs of seconds, and of pages, run beside "
+    "Snakemake, and are not listed.\n"
     "To change one: --set-resources render:mem_mb=16000. See docs/how-to/tune-a-cluster.md."
+)
+# What stands below it if jobs request a GPU.
+GPU_NOTE = (
+    f"GPU: taken as {SPEED_OF_GPU} cores in the run times and the numbers of jobs, not measured. "
+    "CPU time is a core's."
 )
 # The message if a run ends early, and no job has failed.
 UNFINISHED = "error: the run was stopped before its last job: the same command goes on"
@@ -344,6 +349,8 @@ class Handlers:
         requests = [self._request_of(each.name) for each in jobs if not each.job.is_local]
         if found := [request for request in requests if request]:
             print(f"\n{requests_table(found)}\n\n{REQUESTS_NOTE}")
+            if self._run.gpus:
+                print(GPU_NOTE)
 
 
 def announce_stop() -> None:
