@@ -22,6 +22,8 @@ PAGE = (ROOT / "docs/how-to/write-a-scene-in-python.md").read_text()
 # The scene and the YAML that the page shows.
 YAML = re.search(r"```yaml\n(.*?)```", PAGE, re.S)[1]
 SPIRAL = re.search(r"```python\n(.*?)```", PAGE, re.S)[1]
+# The lines that animate it.
+ANIMATION = re.search(r"## Animation\n.*?```python\n(.*?)```", PAGE, re.S)[1]
 RENDERED = """
 render: {samples: 1}
 rigs:
@@ -423,6 +425,24 @@ FILES = ["oak.png"]
     *scenes, modules, paths = lines[-4:]
     assert scenes == ["['Cube', 'called 1 with 4']"] * 2
     assert (modules, paths) == ("[]", "[]")
+
+
+def test_the_animation_of_the_page_moves_and_scales_its_object(folder, run_program):
+    result = build(run_program, folder, SPIRAL + ANIMATION, {"seed": 0, "balls": 1})
+    assert result.returncode == 0, result.stderr
+    program = written(
+        """
+import bpy
+bpy.ops.wm.open_mainfile(filepath="scene.blend")
+for frame in (1, 9, 17):
+    bpy.context.scene.frame_set(frame)
+    balloon = bpy.data.objects["balloon"]
+    print(frame, round(balloon.matrix_world.translation.z, 5), round(balloon.scale.x, 5))
+""",
+        "program.py",
+    )
+    lines = run_program(folder / program, cwd=folder).stdout.splitlines()
+    assert lines[-3:] == ["1 1.0 0.5", "9 1.4 0.75", "17 1.8 1.0"]
 
 
 # ---- the workflow -----------------------------------------------------------------------------
