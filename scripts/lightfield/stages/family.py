@@ -112,7 +112,7 @@ class CountMembers(Stage[CountSettings]):
 
 
 class Prune(PlainStage):
-    """Removes the members that families no longer have."""
+    """Removes the members and datasets that families no longer have."""
 
     name = "prune"
     function = "lightfield.family.prune:prune"
