@@ -654,6 +654,15 @@ def test_mending_sets_aside_what_the_next_run_must_make_again(
 # ---- the page --------------------------------------------------------------------------------
 
 
+def test_a_corpus_has_the_licence_and_the_credit_of_its_scene(members, tmp_path):
+    folder = shutil.copytree(members, tmp_path / "chairs")
+    facts = {"description": "Old chairs", "licence": "CC-BY-4.0", "credit": "A. Joiner"}
+    assert make(folder, **facts).items() >= facts.items()
+    page = (folder / "index.html").read_text()
+    assert all(fact in page for fact in facts.values())
+    assert not make(folder).keys() & facts.keys()
+
+
 @pytest.mark.parametrize("width", accessibility.WIDTHS)
 def test_the_page_of_a_corpus_can_be_filtered(built, show, width):
     tab = show(built / "index.html", width)

@@ -64,6 +64,7 @@ def describe(
     return {
         "format": FORMAT,
         "name": settings.family,
+        **settings.model_dump(include={"description", "licence", "credit"}, exclude_none=True),
         "splits": {
             "shares": settings.splits.as_json(),
             "valid_members": {part: splits[part] for part in PARTS},
