@@ -21,6 +21,7 @@ import numpy as np
 import psutil
 import pytest
 from conftest import BLENDER
+from PIL import Image
 from scipy.ndimage import binary_dilation, binary_erosion
 
 from lightfield.core.errors import UserError
@@ -792,6 +793,20 @@ def test_broken_lightfield_json_fails(case: str, small_dataset: Path) -> None:
     assert problems[0].startswith("lightfield.json: ")
     assert text in problems[0]
     assert str(small_dataset) not in problems[0]
+
+
+def test_a_video_has_a_size_of_its_own_and_must_be_as_its_list_says(small_dataset: Path) -> None:
+    video = small_dataset / "video" / "walk.webp"
+    video.parent.mkdir()
+    Image.new("RGB", (50, 36)).save(video)
+    files_of_video = {"walk.webp": sha256(video)}
+    write_json(video.with_name("export.json"), {"format": "video", "files": files_of_video})
+    assert not failed(validate(small_dataset))
+    Image.new("RGB", (50, 36), "red").save(video)
+    result = validate(small_dataset)
+    (name,) = failed(result)
+    (problem,) = check(result, name).problems
+    assert "video/walk.webp" in problem
 
 
 def test_stray_files_fail(small_dataset: Path) -> None:
