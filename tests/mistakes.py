@@ -898,6 +898,11 @@ EXPLAINED = [
         "exports.nerfstudio.look: is for EXR sources; give look to the reprojection perspective",
     ),
     (
+        "exports.nerfstudio",
+        {"sources": ["view"], "look": "AgX"},
+        "exports.nerfstudio.sources: is 'view'; must be of views, perspective; did you mean views?",
+    ),
+    (
         "exports",
         {"point_cloud": {"sources": ["views"], "look": "AgX", "reinhard": 5}},
         "exports.point_cloud.reinhard: does not go with look",
@@ -924,6 +929,11 @@ EXPLAINED = [
         "sensor.sources: is 'fisheye'; must be of views, perspective",
     ),
     ("sensor", {"rigs": ["LFSpher"]}, "sensor.rigs: there is no rig 'LFSpher'; did you mean"),
+    (
+        "sensor",
+        {"sources": ["perspective"], "rigs": ["LFSpher"]},
+        "sensor.rigs: there is no rig 'LFSpher'; did you mean LFSphere?",
+    ),
     (
         "sensor",
         {"sources": ["perspective"], "rigs": ["LFCuboid"]},
