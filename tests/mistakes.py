@@ -855,6 +855,19 @@ EXPLAINED = [
         ["fisheye"],
         "exports.instant_ngp.sources: is 'fisheye'; must be of views, perspective",
     ),
+    # Names that other programs have for the same.
+    *(
+        (f"rigs.LFSphere.{key}", name, f"; did you mean {right}?")
+        for key, name, right in (
+            ("camera.lens", "perspective", "rectilinear"),
+            ("camera.lens", "Pinhole", "rectilinear"),
+            ("camera.lens", "fisheye", "equidistant"),
+            ("camera.lens", "panorama", "equirectangular"),
+            ("camera.lens", "rectlinear", "rectilinear"),
+            ("type", "dome", "hemisphere"),
+            ("type", "hemispere", "hemisphere"),
+        )
+    ),
     ("render.camera_motion", {}, "render.camera_motion: must have travel, turn, or both"),
     (
         "render",
