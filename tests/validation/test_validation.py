@@ -1689,7 +1689,8 @@ def test_the_program_names_faults_and_publishes_no_checksums(
     published = publish(run_program, dataset)
     assert published.returncode == 1
     assert re.fullmatch(
-        r"error: room/sphere is not valid: views: exr/view_0009f.exr: is missing; "
+        r"error: room/sphere is not valid, and so gets no checksums: "
+        r"views: exr/view_0009f.exr: is missing; "
         r"images: exr/view_0002f.exr: .+; files: stray: is not a file of this dataset: "
         r"see the page\n",
         published.stderr,
