@@ -114,5 +114,4 @@ rule smoke:
 
 rule package:
     input:
-        [dataset.sequence_paths.package for dataset in RUN.chosen],
-        RUN.build.documents,
+        RUN.of_build(RUN.build.packages),

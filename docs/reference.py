@@ -278,18 +278,33 @@ API = [
     Part("reading/dataset.py", "OpenDataset"),
     Part("reading/dataset.py", "OpenViews"),
     Part("reading/dataset.py", "OpenView"),
+    Part("reading/dataset.py", "Reprojections"),
+    Part("reading/surface.py", "SeenSurface"),
+    Part("reading/files.py", "Files"),
     Part(
         "formats/lightfield.py",
         "LightField",
         ("content", "views", "path", "lens", "depth", "world_from_cameras", "light_groups"),
     ),
     Part(
+        "formats/lightfield.py",
+        "View",
+        (
+            "name", "world_from_camera", "position", "rotation", "others", "split", "exposure",
+            "flow", "to_camera",
+        ),
+    ),
+    Part(
         "geometry/lenses/base.py",
         "Lens",
-        ("width", "height", "sensor", "center", "rays", "pixels", "in_frame", "pixel_rays", "K"),
+        (
+            "width", "height", "sensor", "center", "description", "field_of_view", "has_z_depth",
+            "K", "rays", "pixels", "in_frame", "pixel_rays", "resized",
+        ),
     ),
+    Part("imaging/images.py", "Image"),
     Part("core/errors.py", "UserError"),
-]
+]  # fmt: skip
 
 
 def schema_of(model: type[BaseModel]) -> dict[str, Any]:
@@ -533,17 +548,32 @@ class Interface:
         for part in API:
             tree = ast.parse((LIBRARY / part.file).read_text(encoding="utf-8"))
             (node,) = (each for each in tree.body if getattr(each, "name", "") == part.name)
-            assert isinstance(node, ast.FunctionDef | ast.ClassDef)
-            title = _call(node) if isinstance(node, ast.FunctionDef) else node.name
-            self.lines += [f"## {title}", "", *_docstring(node), ""]
-            if isinstance(node, ast.ClassDef):
-                self._members(node, part.members)
+            types = Types(tree)
+            if isinstance(node, ast.FunctionDef):
+                self._function(node, types)
+            else:
+                assert isinstance(node, ast.ClassDef)
+                self._class(node, types, part.members)
         return "\n".join(self.lines)
 
-    def _members(self, node: ast.ClassDef, chosen: tuple[str, ...]) -> None:
-        """Add the table of a class's attributes and methods."""
-        rows = {name: row for child in node.body for name, row in _row_of_member(child, node)}
+    def _function(self, node: ast.FunctionDef, types: "Types") -> None:
+        names = ", ".join(argument.arg for argument in node.args.args)
+        self.lines += [f"## {node.name}({names})", "", *_docstring(node).split("\n"), ""]
+        self.lines += [f"`{types.of_call(node)}` returns {types.of(node.returns)}.", ""]
+
+    def _class(self, node: ast.ClassDef, types: "Types", chosen: tuple[str, ...]) -> None:
+        """Add a class: its text, and the table of its attributes and methods."""
+        meanings = dict(FIELD.findall(_docstring(node)))
+        rows = {
+            name: row
+            for child in node.body
+            for name, row in _row_of_member(child, types, node.name, meanings)
+        }
         shown = chosen or [name for name in rows if not name.startswith("_")]
+        # The table has the attributes that it shows.
+        text = FIELD.sub(lambda field: "" if field[1] in shown else field[0], _docstring(node))
+        paragraphs = re.sub(r"\n\n+", "\n\n", text.strip())
+        self.lines += [f"## {node.name}", "", *paragraphs.split("\n"), ""]
         if shown:
             self.lines += ["| member | type | meaning |", "| --- | --- | --- |"]
             self.lines += [*(rows[name] for name in shown), ""]
@@ -552,61 +582,85 @@ class Interface:
 API_TEXT = """\
 `open_dataset` and `open_corpus` open finished datasets, and return objects with pixels, rays and
 projections. [Read a dataset in Python](../how-to/read-a-dataset.md) has examples. Positions and
-depth are in metres, angles in radians, pixels from the image's top left corner. A `float array` is
-float32 if it holds pixels, and float64 if it holds rays, positions or matrices."""
+depth are in metres, angles in radians, pixels from the image's top left corner. A mistake raises
+`lightfield.core.errors.UserError`, one line."""
 
-# The names of types in the source, as the page shows them.
+# An attribute in the docstring of its class.
+FIELD = re.compile(r"^- `(\w+)`: (.*(?:\n  .*)*)\n?", re.M)
+
+# The names of types in the source, as the page shows them. Arrays have the names of their dtypes.
 TYPES = {
-    "Array": "array",
-    "Floats": "float array",
-    "Doubles": "float array",
-    "Bools": "array of bool",
-    "npt.NDArray[np.bool_]": "array of bool",
     "ArrayLike": "array",
     "npt.ArrayLike": "array",
     "npt.DTypeLike": "dtype",
-    "str | os.PathLike[str]": "path",
-    "Path | str": "path",
-    "View": "view of lightfield.json",
+    "np.ndarray[Any, Any]": "array",
+    "images.Image": "Image",
+    "AbstractContextManager[Path]": "context manager of a Path",
+    "str | os.PathLike[str]": "str or Path",
+    "Self": "Lens",
     "Pair": "two floats",
-    "Pair | None": "two floats or None",
+    "Attribute": "str or number",
+    "Chromaticities": "eight floats",
 }
+ARRAY = re.compile(r"(?:npt\.)?NDArray\[(?:np\.)?(\w+)\]")
 
 
-def _type(annotation: ast.expr | None) -> str:
-    """Return a type as the page shows it."""
-    text = ast.unparse(annotation).strip("'") if annotation else ""
-    for name, plain in TYPES.items():
-        text = re.sub(rf"(?<![\w.]){re.escape(name)}(?![\w\[])", plain, text)
-    return text.replace("'", "").replace(" | ", " or ")
+class Types:
+    """The types in a module, as the page shows them."""
+
+    def __init__(self, tree: ast.Module) -> None:
+        # The module's own names of arrays' types, such as Floats.
+        arrays = {
+            ast.unparse(node.targets[0]): ast.unparse(node.value)
+            for node in tree.body
+            if isinstance(node, ast.Assign) and ARRAY.fullmatch(ast.unparse(node.value))
+        }
+        self.names = arrays | TYPES
+
+    def of(self, annotation: ast.expr | None) -> str:
+        """Return a type as the page shows it."""
+        text = ast.unparse(annotation).strip("'") if annotation else ""
+        for name, plain in self.names.items():
+            text = re.sub(rf"(?<![\w.]){re.escape(name)}(?![\w\[])", plain, text)
+        text = ARRAY.sub(lambda array: f"{array[1].rstrip('_')} array", text)
+        return text.replace("Any array", "array").replace("'", "").replace(" | ", " or ")
+
+    def of_call(self, node: ast.FunctionDef) -> str:
+        """Return how a function is called: its name, and its parameters with their types."""
+        parameters = [
+            f"{argument.arg}: {self.of(argument.annotation)}"
+            for argument in node.args.args
+            if argument.arg not in ("self", "cls")
+        ]
+        return f"{node.name}({', '.join(parameters)})"
 
 
-def _call(node: ast.FunctionDef) -> str:
-    """Return how a function is called: its name and its parameters."""
-    parameters = [argument.arg for argument in node.args.args if argument.arg != "self"]
-    return f"{node.name}({', '.join(parameters)})"
-
-
-def _docstring(node: ast.FunctionDef | ast.ClassDef) -> list[str]:
-    """Return the lines of a docstring as Markdown."""
+def _docstring(node: ast.FunctionDef | ast.ClassDef) -> str:
+    """Return a docstring as Markdown."""
     text = ast.get_docstring(node)
     if not text:
         raise AssertionError(f"{node.name}: has no docstring")
-    return text.replace("``", "`").split("\n")
+    return text.replace("``", "`")
 
 
-def _row_of_member(node: ast.stmt, owner: ast.ClassDef) -> Iterator[tuple[str, str]]:
-    """Yield the name and the row of an attribute or a method."""
+def _row_of_member(
+    node: ast.stmt, types: Types, owner: str, meanings: dict[str, str]
+) -> Iterator[tuple[str, str]]:
+    """Yield the name and the row of an attribute or a method.
+
+    The docstring of the ``owner`` has the ``meanings`` of attributes.
+    """
     if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
         name = node.target.id
-        meaning = f"see the text on `{owner.name}`"
-        yield name, f"| `{name}` | {escaped(_type(node.annotation))} | {meaning} |"
+        meaning = escaped(meanings.get(name) or f"see the text on `{owner}`")
+        yield name, f"| `{name}` | {escaped(types.of(node.annotation))} | {meaning} |"
     elif isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
         decorators = [ast.unparse(each) for each in node.decorator_list]
         is_property = any(each.endswith("property") for each in decorators)
-        call = node.name if is_property else _call(node)
-        meaning = escaped(" ".join(_docstring(node)))
-        yield node.name, f"| `{call}` | {escaped(_type(node.returns))} | {meaning} |"
+        call = node.name if is_property else types.of_call(node)
+        kind = escaped(types.of(node.returns))
+        # Only what the page does not show may have no docstring.
+        yield node.name, f"| `{call}` | {kind} | {escaped(ast.get_docstring(node) or '')} |"
 
 
 def reference() -> dict[str, str]:

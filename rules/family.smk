@@ -77,7 +77,7 @@ rule count_members:
         " --output {output.members} --receipt {output.receipt} > {log} 2>&1"
 
 
-# It has no output. The corpora come first: then no list of checksums has a former member.
+# It has no output. The corpora come first: then no list of checksums has what is removed.
 rule prune:
     input:
         RUN.build.corpora,
@@ -87,6 +87,6 @@ rule prune:
     params:
         prune=PLAN.prune_command,
     message:
-        "Removing the members that the chosen families no longer have"
+        "Removing what the chosen families no longer have"
     shell:
         "{params.prune} 2>&1 | tee {log}"

@@ -1,6 +1,6 @@
-"""Remove the members that families no longer have: their datasets, other files and receipts.
+"""Remove the members that families no longer have, and datasets of rigs that they no longer have.
 
-`snakemake prune` builds the chosen families, and then runs this. Files of present members stay.
+`snakemake prune` builds the chosen families, and then runs this. All that they have stays.
 """
 
 from lightfield.engine.flags import program

@@ -99,6 +99,7 @@ CORPUS_KINDS = {
     "corpus": ("corpus.json", "index.html"),
     "page of a corpus": ("index.html", "corpus.json"),
     "thumbnail": ("thumbnails/0001.webp", "index.html"),
+    "index of shards": ("shards/views.csv", "index.html"),
     "record of a member": ("0001/member.json", "0002/member.json"),
     "record of a failed member": ("broken/member.json", "0001/member.json"),
     "sums of a member": ("0001/plane/sha256sums.txt", "0002/plane/sha256sums.txt"),

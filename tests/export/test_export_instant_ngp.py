@@ -523,6 +523,16 @@ def test_a_rig_that_tests_another_dataset_is_placed_like_it(dataset: Dataset) ->
     assert not (dataset.folder / "transforms_validation.json").exists()
 
 
+def test_a_part_that_the_split_has_no_more_leaves_no_list(dataset: Dataset) -> None:
+    dataset.write(FISHEYE)
+    dataset.export()
+    assert (dataset.folder / "transforms_test.json").exists()
+    dataset.write(FISHEYE, RIG | {"split": "train"})
+    dataset.export()
+    lists = sorted(path.name for path in dataset.folder.glob("transforms*.json"))
+    assert lists == ["transforms.json", "transforms_train.json"]
+
+
 def test_boxes_and_scales_are_passed_on(dataset: Dataset) -> None:
     dataset.write(FISHEYE)
     transforms = dataset.export("--aabb-scale", 16, "--render-aabb", 0.1, 0.2, 0.3, 0.7, 0.8, 0.9)

@@ -223,6 +223,22 @@ def test_two_rigs_that_train_go_into_one_export(tmp_path, monkeypatch):
     assert (jobs["export"], jobs["validate"]) == (2, 1)
 
 
+def test_two_rigs_of_a_sequence_are_exported_together_frame_by_frame(tmp_path, monkeypatch):
+    rig = {**PLANE, "camera": PERSPECTIVE, "frames": {"first": 1, "last": 2}}
+    content = SCENE | {
+        "rigs": {"inner": rig, "outer": rig | {"size": 3}},
+        "exports": {"dnerf": {"sources": ["small"], "together": ["inner", "outer"]}},
+    }
+    (tmp_path / "moving.yaml").write_text(json.dumps(content))
+    monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
+    first, second, *others = scene_datasets("moving")
+    for frame, dataset in (("f00001", first), ("f00002", second)):
+        (export,) = dataset.exports.selected.values()
+        assert dataset.rigs_beside(export) == (f"outer/{frame}",)
+        assert dataset.sequence_exports == ["results/moving/inner/small/exports/dnerf/export.json"]
+    assert all(not dataset.exports.selected for dataset in others)
+
+
 @pytest.mark.parametrize(
     ("together", "changes", "expected"),
     [

@@ -1,5 +1,6 @@
 """The corpus of a family: its split, its statistics, its page, its shards, and its sums."""
 
+import csv
 import json
 import re
 import shutil
@@ -384,6 +385,165 @@ def test_two_members_with_the_same_key_in_shards_are_named(family):
         make(family, shards=True, splits={"validation": 0, "test": 0})
 
 
+# ---- shards that grow -------------------------------------------------------------------------
+
+# A shard has the three views of one member, or fewer: each takes about 4 kB, and the tar 10.
+SMALL = {"shards": True, "shard_gigabytes": 2.4e-5, "splits": {"validation": 0, "test": 0}}
+
+
+def add(family, *numbers, shade=1.0):
+    for number in numbers:
+        families.add_member(family, f"{number:04d}", shade=shade)
+
+
+def shard_bytes(family):
+    return {path.name: path.read_bytes() for path in sorted(family.glob("shards/train/*.tar"))}
+
+
+def keys(family):
+    """Return the keys of all samples, in the order in which a loader reads them."""
+    tars = sorted(family.glob("shards/train/*.tar"))
+    return [name.split(".")[0] for tar in tars for name in samples(tar) if name.endswith(".json")]
+
+
+def keys_of(*numbers):
+    return [f"{n:04d}_plane_view_{view:04d}f" for n in numbers for view in range(3)]
+
+
+def names_of(*numbers):
+    return [f"chairs-train-{number:05}.tar" for number in numbers]
+
+
+@pytest.fixture
+def grown(tmp_path):
+    """A family of members 2, 4 and 6 whose corpus has shards."""
+    family = tmp_path / "results/chairs"
+    add(family, 2, 4, 6)
+    make(family, **SMALL)
+    assert keys(family) == keys_of(2, 4, 6)
+    assert len(shard_bytes(family)) > 2
+    return family
+
+
+@pytest.mark.parametrize("has_index", [True, False], ids=["", "of an older version"])
+def test_new_members_leave_all_shards_but_the_last_as_they_are(grown, has_index):
+    before = shard_bytes(grown)
+    times = {path.name: path.stat().st_mtime_ns for path in grown.glob("shards/train/*.tar")}
+    if not has_index:
+        (grown / "shards/views.csv").unlink()
+    add(grown, 3, 1)
+    make(grown, **SMALL)
+    after = shard_bytes(grown)
+    assert [*after][: len(before)] == [*before]
+    *full, _ = before
+    assert {name: after[name] for name in full} == {name: before[name] for name in full}
+    if has_index:
+        # Nobody has written them again.
+        assert {n: (grown / "shards/train" / n).stat().st_mtime_ns for n in full} == {
+            name: times[name] for name in full
+        }
+    # New members follow in the order of their names, and the shards are as full as before.
+    assert keys(grown) == keys_of(2, 4, 6, 1, 3)
+    assert all(len(content) <= 3 * 10_240 for content in after.values())
+    assert faults(grown) == {}
+    assert len(open_corpus(grown / "shards/train")) == 5
+
+
+def test_a_second_growth_goes_on_with_the_last_shard(grown):
+    for number in (3, 1, 0):
+        add(grown, number)
+        *full, _ = shard_bytes(grown).items()
+        make(grown, **SMALL)
+        assert shard_bytes(grown).items() >= {*full}
+    assert keys(grown) == keys_of(2, 4, 6, 3, 1, 0)
+    # Nothing else fits into any shard but the last.
+    together = shutil.copytree(grown, grown.with_name("other") / "chairs")
+    shutil.rmtree(together / "shards")
+    make(together, **SMALL)
+    assert len(shard_bytes(together)) == len(shard_bytes(grown))
+    assert keys(together) == keys_of(0, 1, 2, 3, 4, 6)
+
+
+def test_a_member_that_goes_or_changes_renews_only_its_own_shards(grown):
+    def shards_of(number):
+        return {
+            path.name
+            for path in grown.glob("shards/train/*.tar")
+            if any(name.startswith(f"{number:04d}_") for name in samples(path))
+        }
+
+    before, touched = shard_bytes(grown), shards_of(2)
+    shutil.rmtree(grown / "0002")
+    add(grown, 2, shade=3)
+    make(grown, **SMALL)
+    after = shard_bytes(grown)
+    assert {name for name in before if before[name] != after.get(name)} == touched
+    assert keys(grown) == keys_of(2, 4, 6)
+    assert faults(grown) == {}
+
+    # Its views go. A shard that has no view any more leaves its number to the next.
+    shutil.rmtree(grown / "0002")
+    make(grown, **SMALL)
+    gone = after.keys() - shard_bytes(grown).keys()
+    assert [*shard_bytes(grown)] == names_of(*range(len(after) - len(gone)))
+    assert keys(grown) == keys_of(4, 6)
+    kept = [content for name, content in after.items() if name not in touched]
+    assert {*shard_bytes(grown).values()} >= {*kept}
+    assert faults(grown) == {}
+
+
+def test_the_index_says_which_shard_has_which_view(grown):
+    add(grown, 1)
+    make(grown, **SMALL)
+    with (grown / "shards/views.csv").open() as file:
+        rows = [*csv.DictReader(file)]
+    assert [row["sample"] for row in rows] == keys(grown)
+    for row in rows:
+        content = json.loads(samples(grown / "shards" / row["shard"])[f"{row['sample']}.json"])
+        told = {key: content[key] for key in ("member", "rig", "view", "split")}
+        assert told == {key: row[key] for key in told}
+    assert "shards/views.csv" in (grown / "sha256sums.txt").read_text()
+    make(grown)
+    assert not [path for path in grown.glob("shards/**/*") if path.is_file()]
+
+
+@pytest.mark.parametrize("name", ["train/chairs-train-00001.tar", "views.csv"])
+@pytest.mark.parametrize("damage", ["flipped", "deleted"])
+def test_a_damaged_shard_or_index_gets_its_bytes_again(grown, monkeypatch, name, damage):
+    monkeypatch.chdir(grown.parents[1])
+    family, receipt = Path("results/chairs"), Path("work/receipts/chairs/corpus.jsonl")
+    add(family, 3, 1)
+    make(family, receipt=receipt, cache=Path("looks.json"), **SMALL)
+    before = files(family / "shards")
+    path = family / "shards" / name
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.unlink()
+    if damage == "flipped":
+        path.write_bytes(content)
+    make(family, receipt=receipt, cache=Path("looks.json"), **SMALL)
+    assert files(family / "shards") == before
+    assert faults(family, Path("work")) == {}
+    noted = receipts.read(receipt).outputs
+    assert {f"results/chairs/shards/{each}" for each in before} <= noted.keys()
+
+
+def test_a_shard_with_other_bytes_than_listed_is_written_again(grown):
+    before = shard_bytes(grown)
+    path = grown / "shards/train/chairs-train-00000.tar"
+    path.write_bytes(before[path.name][::-1])
+    make(grown, **SMALL)
+    assert shard_bytes(grown) == before
+
+
+def test_smaller_shards_move_views_to_the_end(grown):
+    before = keys(grown)
+    make(grown, **SMALL | {"shard_gigabytes": 1.7e-5})
+    assert sorted(keys(grown)) == sorted(before)
+    assert all(len(content) <= 2 * 10_240 for content in shard_bytes(grown).values())
+    assert faults(grown) == {}
+
+
 # ---- sums ------------------------------------------------------------------------------------
 
 
@@ -439,6 +599,22 @@ def test_a_dataset_that_the_sums_leave_out_is_found(built, tmp_path):
     assert faults(folder).keys() == {str(sums)}
 
 
+def test_what_a_corpus_no_longer_has_is_named_once(built, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    shutil.copytree(folder / "0001", folder / "0009")
+    shutil.copytree(folder / "0001/plane", folder / "0002/ring")
+    found = faults(folder)
+    assert found.keys() == {str(folder / "0009"), str(folder / "0002/ring")}
+    assert all("prune" in problem for problem in found.values())
+
+
+def test_the_whole_files_of_a_failed_member_are_no_fault(built, tmp_path):
+    folder = shutil.copytree(built, tmp_path / "chairs")
+    shutil.copytree(folder / "0001/plane", folder / "broken/plane")
+    (folder / "broken/plane/sha256sums.txt").unlink()
+    assert faults(folder) == {}
+
+
 def test_the_program_that_checks_every_byte_checks_a_corpus(built, run_program, tmp_path):
     folder = shutil.copytree(built, tmp_path / "chairs")
     assert "no fault" in run_program("verify.py", folder).stdout
@@ -476,6 +652,15 @@ def test_mending_sets_aside_what_the_next_run_must_make_again(
 
 
 # ---- the page --------------------------------------------------------------------------------
+
+
+def test_a_corpus_has_the_licence_and_the_credit_of_its_scene(members, tmp_path):
+    folder = shutil.copytree(members, tmp_path / "chairs")
+    facts = {"description": "Old chairs", "licence": "CC-BY-4.0", "credit": "A. Joiner"}
+    assert make(folder, **facts).items() >= facts.items()
+    page = (folder / "index.html").read_text()
+    assert all(fact in page for fact in facts.values())
+    assert not make(folder).keys() & facts.keys()
 
 
 @pytest.mark.parametrize("width", accessibility.WIDTHS)

@@ -1,5 +1,6 @@
 """Pruning: members that a family no longer has are named, and removed on request."""
 
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -62,10 +63,10 @@ def test_only_what_belongs_to_former_members_is_removed(folder, capsys):
     assert capsys.readouterr().out.splitlines() == [
         "results/chairs/0002: removed",
         "results/chairs/0003: removed",
-        "chairs: 2 former members removed",
+        "chairs: 2 former folders removed",
     ]
     prune("chairs")
-    assert capsys.readouterr().out == "chairs: 0 former members removed\n"
+    assert capsys.readouterr().out == "chairs: 0 former folders removed\n"
 
 
 def test_what_links_of_a_former_member_lead_to_stays(folder, tmp_path):
@@ -77,6 +78,20 @@ def test_what_links_of_a_former_member_lead_to_stays(folder, tmp_path):
     prune("chairs")
     assert sorted(path.name for path in Path("results/chairs").iterdir()) == ["0000", "0001"]
     assert below("elsewhere", "outside") == kept
+
+
+def test_datasets_of_a_rig_that_is_gone_are_removed(folder, capsys):
+    for number in (0, 1):
+        shutil.copytree(f"results/chairs/{number:04d}/plane", f"results/chairs/{number:04d}/ring")
+        touch(f"work/chairs/{number:04d}/ring/cameras.json")
+    touch("results/chairs/0000/my notes/read me.txt")
+    before = below("results", "work")
+    prune("chairs")
+    gone = before - below("results", "work")
+    of_2 = {path for path in before if "0002" in Path(path).parts}
+    of_2.add("work/receipts/chairs/batches/seeds_0002_0002.jsonl")
+    assert gone == of_2 | {path for path in before if "ring" in Path(path).parts}
+    assert "results/chairs/0001/ring: removed\n" in capsys.readouterr().out
 
 
 def test_a_scene_without_a_family_is_refused(folder):
@@ -115,18 +130,17 @@ def test_a_removed_model_is_named_until_its_member_is_pruned(tmp_path):
     choice = ("--config", "scenes=[faces]", "rigs=all", "preset=full")
     run = snakemake(folder, *choice)
     assert run.returncode == 0, run.stderr
-    assert "former" not in run.stderr
+    assert "prune" not in run.stderr
     (folder / "models/face1.obj").unlink()
 
     run = snakemake(folder, *choice)
     assert run.returncode == 0, run.stderr
-    (note,) = [line for line in run.stderr.splitlines() if "former" in line]
-    assert note.startswith("note: results/faces still has 1 former member: face1_obj; ")
-    assert "prune" in note
+    (note,) = [line for line in run.stderr.splitlines() if "prune" in line]
+    assert note.startswith("note: results/faces has what the family no longer has: face1_obj; ")
     checked = verify(folder)
     assert checked.returncode == 1
     (fault,) = checked.stdout.splitlines()
-    assert fault.startswith("results/faces/face1_obj: is no member of corpus.json any more")
+    assert fault.startswith("results/faces/face1_obj: is not in corpus.json any more")
 
     plan = snakemake(folder, "prune", "--dry-run", *choice)
     assert plan.returncode == 0, plan.stderr

@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-DIFFS = re.findall(r"^```diff\n(.*?)^```$", (ROOT / "CONTRIBUTING.md").read_text(), re.M | re.S)
+PAGE = (ROOT / "CONTRIBUTING.md").read_text()
+DIFFS = re.findall(r"^```diff\n(.*?)^```$", PAGE, re.M | re.S)
+CODE = re.compile(r"^```.*?^```$", re.M | re.S)
 # What belongs to a checkout, and not to the code.
 LEFT_OUT = shutil.ignore_patterns(
     *(".git", ".venv*", ".snakemake", "__pycache__", ".*_cache", "work", "results", "build", "site")
@@ -54,6 +56,30 @@ def added_files():
 
 def test_a_lens_a_rig_a_setting_and_an_exporter_have_an_example():
     assert len(DIFFS) == 4
+
+
+def recipes():
+    """Return the sections that say how to add something, by their titles."""
+    sections = re.split(r"^## ", CODE.sub("", PAGE), flags=re.M)[1:]
+    return {
+        title: text
+        for title, _, text in (section.partition("\n") for section in sections)
+        if title.startswith(("A ", "An ", "Generated"))
+    }
+
+
+@pytest.mark.parametrize("title", recipes())
+def test_a_recipe_names_the_test_that_holds_it(title):
+    named = re.findall(r"\btests/[\w/]+\.py\b", recipes()[title])
+    assert [path for path in named if Path(path).name.startswith("test_")]
+    assert [path for path in named if not (ROOT / path).is_file()] == []
+
+
+def test_there_are_recipes_and_the_commands_that_the_page_names():
+    assert {"A lens", "A rig", "An exporter", "A stage", "A page of the documents"} <= {*recipes()}
+    targets = re.findall(r"^([a-z-]+):(?!=)", (ROOT / "Makefile").read_text(), re.M)
+    named = re.findall(r"`make ([a-z-]+)`", PAGE)
+    assert {"check", "test"} <= {*named} <= {*targets}
 
 
 def test_an_exporter_touches_its_file_its_tests_and_a_table():

@@ -1,11 +1,11 @@
 """The documents: working links, pages of readable length, and a true reference."""
 
-import dataclasses
 import inspect
 import os
 import re
 import subprocess
 import sys
+import typing
 from pathlib import Path
 
 import pytest
@@ -18,8 +18,10 @@ from lightfield.configuration.scene_checks import rigs
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.geometry import frames
 from lightfield.geometry.rigs.poses import LARGEST_FILE
-from lightfield.imaging.images import HALF_MAX
+from lightfield.imaging.images import HALF_MAX, Image
 from lightfield.reading.dataset import OpenDataset, OpenView
+from lightfield.reading.files import Files
+from lightfield.reading.surface import SeenSurface
 from lightfield.settings.base import checked
 from lightfield.stages.registry import VERSIONS as STAGE_VERSIONS
 
@@ -170,17 +172,81 @@ def rows_of(page, heading):
     return [cell.strip("`") for cell in re.findall(r"^\| (`[^|]+`) \|", section, re.M)]
 
 
-@pytest.mark.parametrize("model", [OpenDataset, OpenView])
+API = DOCS / "reference/api.md"
+
+
+def first_heading(page):
+    return HEADING.search(page.read_text())[1]
+
+
+def types_of(member):
+    """Return the types of a method or a property. None for another member."""
+    function = getattr(member, "fget", None) or getattr(member, "func", None) or member
+    function = getattr(function, "__func__", function)
+    return typing.get_type_hints(function).values() if callable(function) else ()
+
+
+def library_classes(annotation):
+    """Return the classes of the library in a type, such as list[OpenDataset]."""
+    inner = [each for part in typing.get_args(annotation) for each in library_classes(part)]
+    is_own = inspect.isclass(annotation) and annotation.__module__.startswith("lightfield.")
+    return [annotation, *inner] if is_own else inner
+
+
+def reached_classes():
+    """Return the names of the classes to which the public functions lead, by types on the page."""
+    functions = [getattr(lightfield, name) for name in lightfield.__all__]
+    queue = [typing.get_type_hints(function)["return"] for function in functions]
+    reached = set()
+    while queue:
+        for model in library_classes(queue.pop()):
+            if model not in reached:
+                reached.add(model)
+                queue += getattr(model, "__orig_bases__", ())
+                fields = typing.get_type_hints(model)
+                for row in rows_of(API, model.__name__):
+                    name = row.partition("(")[0]
+                    member = inspect.getattr_static(model, name, None)
+                    queue += [fields[name]] if name in fields else types_of(member)
+    return {model.__name__ for model in reached}
+
+
+def test_the_page_of_the_library_has_each_class_to_which_its_functions_lead():
+    reached = reached_classes()
+    assert {"OpenDataset", "OpenViews", "OpenView", "LightField", "View", "Lens"} <= reached
+    headings = {heading.partition("(")[0] for heading in HEADING.findall(API.read_text())}
+    # An exception is in no type.
+    expected = {*reached, *lightfield.__all__, "UserError"}
+    assert expected == headings - {first_heading(API)}
+
+
+@pytest.mark.parametrize("model", [OpenDataset, OpenView, SeenSurface, Image, Files])
 def test_the_page_of_the_library_has_each_public_member_of_what_a_reader_gets(model):
-    fields = [field.name for field in dataclasses.fields(model)]
-    members = {*fields, *vars(model)}
-    page = DOCS / "reference/api.md"
-    shown = {row.partition("(")[0] for row in rows_of(page, model.__name__)}
+    members = {*inspect.get_annotations(model), *vars(model)}
+    shown = {row.partition("(")[0] for row in rows_of(API, model.__name__)}
     assert shown == {name for name in members if not name.startswith("_")}
 
 
+# What a text says of a number: its unit, its range, or what it counts.
+UNIT = re.compile(
+    r"metres|radians|pixel|\bmm\b|0 to 1|0 for (the|its) first|units|unit (rays|normals)|"
+    r"linear light|Rec\. 709|uint8|frame of the animation|file's dtype|divided|x and y of|"
+    r"numbers in a pass"
+)
+
+
+def test_each_number_and_array_of_the_library_has_its_unit():
+    rows = re.findall(r"^\| (`[^|]+`) \| ([^|]+) \| (.*) \|$", API.read_text(), re.M)
+    assert len(rows) > 80
+    for name, kind, meaning in rows:
+        assert meaning.strip(), name
+        assert "see the text" not in meaning, name
+        if re.search(r"\b(floats?|int|float32|float64|(?<!bool )array)\b", kind):
+            assert UNIT.search(meaning), (name, meaning)
+
+
 def test_the_page_of_the_library_has_each_function_with_its_parameters():
-    text = (DOCS / "reference/api.md").read_text()
+    text = API.read_text()
     for name in lightfield.__all__:
         function = getattr(lightfield, name)
         assert f"\n## {name}({', '.join(inspect.signature(function).parameters)})\n" in text

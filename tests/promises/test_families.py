@@ -50,6 +50,19 @@ def build(parameters):
 """
 
 
+def test_what_packs_datasets_refuses_a_family(tmp_path):
+    folder = checkout(tmp_path / "plenoforge", rooms=ROOMS)
+    chosen = ("--config", "scenes=[rooms]", "preset=full")
+    run = snakemake(folder, "--dry-run", *chosen, "--", "package")
+    assert run.returncode == 1
+    assert "package: rooms: a family has no packages; its corpus is published as it" in run.stderr
+    scene = folder / "configs/scenes/rooms.yaml"
+    scene.write_text(f"{ROOMS}publish: {{creators: [{{name: A. Joiner}}], licence: CC0-1.0}}\n")
+    run = snakemake(folder, "--dry-run", *chosen)
+    assert run.returncode == 1
+    assert "publish: does not go with family; its corpus has the licence" in run.stderr
+
+
 def assert_two_members_failed(run, folder):
     """Check the first run: two members failed, and the others are complete datasets."""
     members = folder / "results/rooms"

@@ -27,7 +27,7 @@ SCENE = {
 }
 for rig in SCENE["rigs"].values():
     rig["camera"] = CAMERA
-MODEL = Path("results/tiny/inner/colmap")
+MODEL = Path("results/tiny/inner/exports/colmap")
 
 
 def model(folder):
@@ -50,7 +50,7 @@ def test_two_rigs_in_one_export_are_built_and_grow(tmp_path):
     assert centres.keys() == expected.keys() and len(centres) == 8
     for name, position in expected.items():
         np.testing.assert_allclose(centres[name], position, atol=1e-6)
-    assert not (folder / "results/tiny/outer/colmap").exists()
+    assert not (folder / "results/tiny/outer/exports").exists()
 
     (folder / "results/tiny/outer/exr/view_0001f.exr").unlink()
     jobs = planned(folder, *tiny.CHOSEN)

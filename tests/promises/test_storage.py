@@ -170,6 +170,7 @@ BROUGHT_WORDS = (
     "--",
     *(f"results/{name}/LFPlane/validation.json" for name in ("brought", "theirs")),
     "results/modelled/modelled_LFPair.tar",
+    "results/modelled/LFPair/report/sequence.html",
     f"{PUBLISHED}/croissant.json",
 )
 
@@ -218,6 +219,7 @@ def test_a_users_files_reach_jobs_in_isolated_folders(run_program, tmp_path):
     rig = tmp_path / "results/modelled/LFPair"
     assert bookkeeping.problems([rig], work=None) == {}
     assert len([*rig.glob("exports/dnerf/*/f0000?_view_*.png")]) == 4
+    assert (rig / "report/sequence.html").is_file()
     (shard,) = (tmp_path / PUBLISHED).glob("modelled_LFPair-*.tar")
     with tarfile.open(shard) as archive:
         # Four samples, each with its pose, its view and a thumbnail.

@@ -178,8 +178,12 @@ def _write(
     view_names = {output: [view.name for view in lightfield.views]}
     for part in PARTS:
         names = [view.name for view in lightfield.views if view.split == part]
+        part_list = output.with_stem(f"{output.stem}_{part}")
         if names:
-            view_names[output.with_stem(f"{output.stem}_{part}")] = names
+            view_names[part_list] = names
+        else:
+            # An earlier split may have had this part.
+            part_list.unlink(missing_ok=True)
     writer = _TransformsWriter(options, lightfield, suffix, places, training_list)
     scale, offset = writer.placement()
     common = writer.lens_keys | {"scale": scale, "offset": offset}

@@ -3,6 +3,7 @@
 import statistics
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,11 @@ from lightfield.configuration.corpus import PAGE, THUMBNAILS
 from lightfield.configuration.family import RECORD
 from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import sha256, write_json, write_text
+from lightfield.core.files import DAMAGE, sha256, write_json, write_text
 from lightfield.core.names import CORPUS, PARTS
 from lightfield.family import corpus_looks, corpus_page, corpus_shards, members_list
 from lightfield.family.corpus_looks import Look
-from lightfield.formats.layout import SUMS
+from lightfield.formats.layout import SUMS, read_sums
 from lightfield.stages.family import Corpus, CorpusSettings
 from lightfield.workflow.member_record import MemberRecord, read_members
 
@@ -26,22 +27,31 @@ _BINS = 20
 def write(job: Corpus) -> dict[str, Any]:
     """Write the corpus of a family. Return the content of its corpus.json.
 
-    Equal members and settings give equal bytes. The sums come last: they exist only when everything
-    else does. Raises `UserError` for a member whose files are missing or damaged.
+    Equal members and settings give equal bytes, but for shards, which keep the order in which the
+    members came, and for `MEMBERS`, which has times. The sums come last: they exist only when
+    everything else does. Raises `UserError` for a member whose files are missing or damaged.
     """
     folder = job.folder
     settings = job.settings
+    earlier_sums = _earlier_sums(folder / SUMS)
     (folder / SUMS).unlink(missing_ok=True)
     members = read_members(folder, settings.members)
     looks = corpus_looks.looks(folder, members, job.cache, settings.look)
     content = describe(settings, members, looks)
     write_json(folder / CORPUS, content)
     corpus_page.write(folder, content)
-    corpus_shards.write(folder, settings, members)
+    corpus_shards.write(folder, settings, members, earlier_sums)
     members_list.write(folder, settings, members, job.receipt.parent if job.receipt else None)
     write_sums(folder, members, looks)
     print(summary(content, folder))
     return content
+
+
+def _earlier_sums(path: Path) -> dict[str, str]:
+    """Return the sums of an earlier list. Empty if it is missing or damaged."""
+    with suppress(OSError, UserError, *DAMAGE):
+        return read_sums(path)
+    return {}
 
 
 def describe(
@@ -54,6 +64,7 @@ def describe(
     return {
         "format": FORMAT,
         "name": settings.family,
+        **settings.model_dump(include={"description", "licence", "credit"}, exclude_none=True),
         "splits": {
             "shares": settings.splits.as_json(),
             "valid_members": {part: splits[part] for part in PARTS},

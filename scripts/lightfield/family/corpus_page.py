@@ -24,8 +24,8 @@ HEIGHT = 80
 # More values than these of a name are put together as the last bar.
 _MOST_COUNTS = 8
 TITLES = {
-    "nearest_metres": "Nearest surface, in metres",
-    "farthest_metres": "Farthest surface, in metres",
+    "nearest_metres": "Distance of the nearest surface, in metres",
+    "farthest_metres": "Distance of the farthest surface, in metres",
     "brightness": "Brightness: mean luminance",
     "over_exposed": "Share of pixels beyond white",
     "covered": "Share of pixels with a surface",
@@ -41,6 +41,9 @@ def write(folder: Path, content: Mapping[str, Any]) -> None:
         folder / PAGE,
         "corpus.html.j2",
         name=content["name"],
+        description=content.get("description"),
+        licence=content.get("licence"),
+        credit=content.get("credit"),
         numbers=numbers,
         size=units.size(numbers["bytes"]),
         parts=[(part, content["splits"]["valid_members"][part]) for part in PARTS],

@@ -57,9 +57,12 @@ MODEL_PLACEMENT = "model_placement"
 class View:
     """A view, which SILVR calls a frame. Here, a frame is a frame of an animated scene.
 
-    ``world_from_camera`` (4, 4) is in metres. The camera looks along −Z, and +Y is up.
-    ``position`` (3,) in metres and ``rotation`` (3,) give the same pose. The rotation is Blender's:
-    XYZ Euler angles in radians. ``others`` are the frame's other keys.
+    - ``name``: the name, such as view_0000f.
+    - ``world_from_camera``: the camera-to-world matrix (4, 4) in metres. The camera looks along −Z,
+      and +Y is up.
+    - ``position``: the place (3,) in metres of the same pose.
+    - ``rotation``: the rotation (3,) of the same pose, as Blender's XYZ Euler angles in radians.
+    - ``others``: the frame's other keys.
     """
 
     name: str
@@ -97,7 +100,7 @@ class View:
 
     @property
     def exposure(self) -> tuple[Floats, Floats] | None:
-        """The camera-to-world matrices (4, 4) at the start and the end of the exposure.
+        """The camera-to-world matrices (4, 4) in metres, at the start and the end of the exposure.
 
         None if the camera stands still.
         """
@@ -126,12 +129,17 @@ class View:
 
 @dataclass(eq=False)
 class LightField:
-    """A lightfield.json. ``content`` holds its keys without ``frames``, which are the ``views``.
+    """A lightfield.json.
 
-    All views share ``lens``. ``depth`` is what channel Z of the views means: "z", along the optical
-    axis, "distance", or None for no depth. SILVR's files lack this key. Then it is "z" if the lens
-    can have that. Raises `UserError`, one line with ``path`` and the key, for an unknown lens, a
-    depth that the lens cannot have, and unknown passes.
+    - ``content``: its keys without ``frames``.
+    - ``views``: the entries of its key ``frames``.
+    - ``path``: the file, for messages.
+    - ``lens``: the lens, which all views share.
+    - ``depth``: what channel Z of the views means: "z", along the optical axis, "distance", or None
+      for no depth. SILVR's files lack this key. Then it is "z" if the lens can have that.
+
+    Raises `UserError`, one line with ``path`` and the key, for an unknown lens, a depth that the
+    lens cannot have, and unknown passes.
     """
 
     content: Mapping[str, Any]
@@ -265,7 +273,7 @@ class LightField:
 
     @cached_property
     def world_from_cameras(self) -> Floats:
-        """The views' camera-to-world matrices, (n, 4, 4)."""
+        """The views' camera-to-world matrices (n, 4, 4) in metres."""
         return np.array([view.world_from_camera for view in self.views]).reshape(-1, 4, 4)
 
     @property

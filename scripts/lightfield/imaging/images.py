@@ -68,9 +68,12 @@ _EXR_TYPES = {"HALF": np.float16, "FLOAT": np.float32, "UINT": np.uint32}
 
 @dataclass(frozen=True)
 class Image:
-    """An image in memory: ``channels`` maps names to (height, width) arrays of the file's dtype.
+    """An image in memory.
 
-    ``chromaticities`` come from an EXR's header. None for a file without them.
+    - ``channels``: arrays (height, width) of the file's dtype, by the names of the channels.
+    - ``attributes``: the values in the file's header by their names.
+    - ``chromaticities``: x and y of R, G, B and white, from an EXR's header. None for a file
+      without them.
     """
 
     channels: dict[str, np.ndarray[Any, Any]]

@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, write_csv
@@ -60,11 +60,36 @@ class Sample:
     @property
     def members(self) -> Iterator[tuple[str, Path | bytes]]:
         """The members of the tar: their names, and their files or contents."""
-        yield f"{self.key}.json", (json.dumps(self.content, indent=1) + "\n").encode()
+        yield f"{self.key}.json", self.text
         for name, path in sorted(self.files.items()):
             yield f"{self.key}.{name}", path
         if self.thumbnail:
             yield f"{self.key}.{THUMBNAIL}", self.thumbnail
+
+    @property
+    def text(self) -> bytes:
+        """The JSON."""
+        return (json.dumps(self.content, indent=1) + "\n").encode()
+
+    @property
+    def tar_bytes(self) -> int:
+        """The most bytes that it takes in a tar."""
+        contents = (
+            len(content) if isinstance(content, bytes) else content.stat().st_size
+            for _, content in self.members
+        )
+        return sum(map(tar_size, contents))
+
+
+class InTar(Protocol):
+    """What a tar holds, a sample, by its size."""
+
+    @property
+    def tar_bytes(self) -> int:
+        """The most bytes that it takes in a tar."""
+
+
+Packed = TypeVar("Packed", bound=InTar)
 
 
 @dataclass(frozen=True)
@@ -220,22 +245,17 @@ def write_others(output: Path, name: str, datasets: Sequence[DatasetFiles]) -> P
     return path
 
 
-def parts(samples: Iterable[Sample], most: float) -> Iterator[list[Sample]]:
-    """Yield runs of samples whose tar has at most ``most`` bytes."""
-    part: list[Sample] = []
+def parts(samples: Iterable[Packed], most: float) -> Iterator[list[Packed]]:
+    """Yield runs of samples whose tar has at most ``most`` bytes. A larger sample is alone."""
+    part: list[Packed] = []
     size = float(tarfile.RECORDSIZE)
     for sample in samples:
-        contents = (
-            len(content) if isinstance(content, bytes) else content.stat().st_size
-            for _, content in sample.members
-        )
-        needed = sum(map(tar_size, contents))
-        if part and size + needed > most:
+        if part and size + sample.tar_bytes > most:
             yield part
             part = []
             size = tarfile.RECORDSIZE
         part.append(sample)
-        size += needed
+        size += sample.tar_bytes
     if part:
         yield part
 

@@ -35,8 +35,10 @@ Bools = NDArray[np.bool_]
 class OpenView:
     """One view. Arrays have a row for each row of pixels, from the top: (height, width, …).
 
-    ``dataset`` is the dataset of its frame. ``camera`` is its entry in lightfield.json. A property
-    reads its file each time, so keep the arrays that you need again.
+    A property reads its file each time, so keep the arrays that you need again.
+
+    - ``dataset``: the dataset of its frame.
+    - ``camera``: its entry in lightfield.json.
     """
 
     dataset: "OpenDataset"
@@ -57,7 +59,7 @@ class OpenView:
 
     @property
     def world_from_camera(self) -> Doubles:
-        """The camera-to-world matrix (4, 4). The camera looks along −Z, and +Y is up."""
+        """The camera-to-world matrix (4, 4) in metres. The camera looks along −Z, +Y is up."""
         return self.camera.world_from_camera.copy()
 
     @property
@@ -124,7 +126,8 @@ class OpenView:
     def read(self, name: str) -> Array:
         """Return a pass: (height, width, channels), or (height, width) if it has one channel.
 
-        Numbers of objects are whole. All other passes are float32.
+        Numbers of objects are whole. All other passes are float32. The reference of passes has
+        their units.
         """
         self.dataset.require_pass(name)
         view_pass = _pass_named(name)
@@ -216,7 +219,11 @@ class OpenView:
 
 
 class OpenViews(Sequence[OpenView]):
-    """Views in the order of lightfield.json: by number, by name, or a part of them."""
+    """Views in the order of lightfield.json, as a Python sequence.
+
+    ``views[3]``, ``views[-1]`` and ``views["view_0003f"]`` are an `OpenView`, and ``views[2:5]`` is
+    an `OpenViews`. Raises `UserError` for an unknown name, and IndexError for an unknown number.
+    """
 
     def __init__(self, views: Iterable[OpenView]) -> None:
         self._views = list(views)
@@ -264,7 +271,10 @@ class OpenViews(Sequence[OpenView]):
 
 
 class Reprojections(dict[str, "OpenDataset"]):
-    """The reprojections of a dataset by their names. An unknown name is a `UserError`."""
+    """The reprojections of a dataset by their names, as a dict of `OpenDataset`.
+
+    Raises `UserError` for an unknown name.
+    """
 
     def __init__(self, place: Path, datasets: Mapping[str, "OpenDataset"]) -> None:
         super().__init__(datasets)
@@ -281,6 +291,7 @@ class OpenDataset:
 
     - ``files``: the files of the dataset, in a folder, a package or shards.
     - ``folders``: the folder of each frame of a sequence. Without a sequence, the dataset's own.
+    - ``reprojection``: the name of the reprojection. Empty for the rig's own views.
     - ``times``: the time of each frame: 0 for the first, 1 for the last.
     - ``member``: in a corpus, what corpus.json says of the scene, such as ``name`` and ``split``.
     - ``suffix``: of the views' files, such as .png. Without it, each view has its best file.

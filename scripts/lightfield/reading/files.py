@@ -14,7 +14,10 @@ from lightfield.formats.lightfield import NAME
 
 
 class Files(ABC):
-    """The files below a folder. ``path`` is what the user opened. Names have slashes."""
+    """The files of a dataset, in a folder or in tars. Their names have slashes.
+
+    - ``path``: what the user opened.
+    """
 
     path: Path
 

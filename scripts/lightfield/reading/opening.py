@@ -38,7 +38,8 @@ def open_dataset(path: str | os.PathLike[str]) -> OpenDataset:
     - the .tar of a package. Further parts are found beside it;
     - a folder of WebDataset shards, one shard, or a run of shards such as ``x-{00000..00009}.tar``.
 
-    Raises `UserError`, an exception of one line, if there is no dataset, or more than one.
+    Raises `UserError`, an exception of one line, if there is no dataset, or more than one, and if
+    shards or parts of a package are missing.
     """
     datasets = open_corpus(path)
     if len(datasets) > 1:
@@ -52,7 +53,8 @@ def open_corpus(path: str | os.PathLike[str]) -> list[OpenDataset]:
     """Open all datasets at ``path``: of a family, of a scene's rigs, or of a folder of packages.
 
     ``member`` of a family's dataset has what its corpus.json says of the scene. Takes all that
-    `open_dataset` takes, too. Raises `UserError` if there is no dataset.
+    `open_dataset` takes, too, and a family's folder ``shards``. Raises `UserError` if there is no
+    dataset, and if shards or parts of a package are missing.
     """
     # Files are read later, when the program may have changed its directory.
     path = Path(path).absolute()

@@ -19,7 +19,13 @@ _ON_SURFACE = 0.01
 
 @dataclass(frozen=True)
 class SeenSurface:
-    """The first surface around a camera: ``distance`` (h, w) in metres along ``rays`` (h, w, 3)."""
+    """The first surface around a camera.
+
+    - ``lens``: the camera's lens.
+    - ``view``: the camera's pose.
+    - ``rays``: the unit rays (h, w, 3) of all pixels' centres, in the camera's coordinates.
+    - ``distance``: the distance (h, w) of the surface from the camera in metres, along the rays.
+    """
 
     lens: Lens
     view: View

@@ -62,6 +62,7 @@ def environment() -> jinja2.Environment:
         "walk_js": Markup(joined_script(only_of_walk)),
         "only_walk_js": Markup(joined_script(script_modules(TEMPLATES / "walk_alone/main.js"))),
         "relight_js": Markup(joined_script(only_of_relight)),
+        "sequence_css": Markup((TEMPLATES / "sequence/page.css").read_text("utf-8")),
         "sequence_js": Markup(joined_script(script_modules(TEMPLATES / "sequence/main.js"))),
     }
     return environment

@@ -77,6 +77,9 @@ class CorpusSettings(CorpusOptions, ReaderSettings):
         "a record.",
     )
     look: ShownLook | None = Field(None, description="Look of the thumbnails.")
+    description: str | None = Field(None, description="Description of the members, in one line.")
+    licence: str | None = Field(None, description="Licence of the scene and of the data.")
+    credit: str | None = Field(None, description="How to cite the artist of the scene.")
 
 
 class Corpus(Stage[CorpusSettings]):
@@ -112,7 +115,7 @@ class CountMembers(Stage[CountSettings]):
 
 
 class Prune(PlainStage):
-    """Removes the members that families no longer have."""
+    """Removes the members and datasets that families no longer have."""
 
     name = "prune"
     function = "lightfield.family.prune:prune"

@@ -95,7 +95,6 @@ class ReportSequence(Stage[SequenceSettings]):
 
     name = "report_sequence"
     function = "lightfield.report.sequence_page:write"
-    version = 1
 
     rig: Path = reads("folder of the rig, which holds the folders of the frames")
     rig_name: str = option("name of the rig, scene/rig", flag="--name", metavar="NAME")

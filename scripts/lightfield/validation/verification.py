@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from lightfield.configuration.corpus import SHARDS, THUMBNAILS
 from lightfield.configuration.family import RECORD
@@ -40,9 +41,7 @@ from lightfield.stages.checks import Verify
 
 CHANGED = "has changed since a job read it"
 STRAY = "is not a file of this dataset, or has no checksum"
-FORMER_MEMBER = (
-    f"is no member of {CORPUS} any more; snakemake prune removes it where the family is built"
-)
+FORMER = f"is not in {CORPUS} any more; snakemake prune removes it where the family is built"
 
 
 def verify(job: Verify) -> None:
@@ -223,14 +222,21 @@ class _Verification:
             self._are_listed([home / IMAGES / f"{view.name}.exr" for view in views], sums)
 
     def _check_members(self, home: Path) -> None:
-        """Check that the list of a corpus has all datasets. Name a former member once."""
-        names = _members_of_corpus(home)
+        """Check that the list of a corpus has all datasets. Name what is no part of it any more."""
+        members = _members_of_corpus(home)
         for dataset in self.homes[1:]:
-            member = dataset.relative_to(home).parts[0]
-            if names and member not in names:
-                self.problems[str(home / member)] = FORMER_MEMBER
-            elif str(dataset / SUMS) not in self.listed:
-                self.problems[str(dataset / SUMS)] = f"has no checksum in {home / SUMS}"
+            name, *rig = dataset.relative_to(home).parts
+            sums = str(dataset / SUMS)
+            member = members.get(name, {})
+            if members and not member:
+                self.problems[str(home / name)] = FORMER
+            elif member.get("state") == "failed" and not os.path.lexists(sums):
+                # It keeps its whole files, so that a later run need not make them again.
+                self.problems.pop(sums, None)
+            elif member and "/".join(rig) not in member.get("datasets", {}):
+                self.problems[str(dataset)] = FORMER
+            elif sums not in self.listed:
+                self.problems[sums] = f"has no checksum in {home / SUMS}"
 
     def _are_listed(self, required: Iterable[Path], sums: Path) -> bool:
         """Return whether files are in a list. The first that is not is a fault of the list."""
@@ -267,11 +273,11 @@ class _Verification:
         return str(home / CORPUS) in self.listed or (home / CORPUS).exists()
 
 
-def _members_of_corpus(home: Path) -> set[str]:
-    """Return the names of the members in corpus.json. Empty if it is missing or damaged."""
+def _members_of_corpus(home: Path) -> dict[str, dict[str, Any]]:
+    """Return the members in corpus.json by name. Empty if it is missing or damaged."""
     with suppress(UserError, *DAMAGE):
-        return {member["name"] for member in read_json(home / CORPUS)["members"]}
-    return set()
+        return {member["name"]: member for member in read_json(home / CORPUS)["members"]}
+    return {}
 
 
 def _homes(folder: Path, present: Iterable[str]) -> list[Path]:

@@ -240,6 +240,18 @@ class Build:
             (name, len(frames), frames[0].paths.probe) for name, frames in frames_of_rig.items()
         ]
 
+    def packages(self, wildcards: Wildcards) -> list[str]:
+        """Return the packages of the chosen datasets, and the documents beside them.
+
+        Raises `UserError` if only families are chosen, which have no packages.
+        """
+        if not self.chosen:
+            raise UserError(
+                f"package: {' and '.join(self.families)}: a family has no packages; its corpus is "
+                "published as it is, see docs/how-to/use-a-corpus.md"
+            )
+        return [*(dataset.sequence_paths.package for dataset in self.chosen), *self.documents]
+
     @property
     def documents(self) -> list[str]:
         """The descriptions of the chosen datasets whose scene YAML says how to publish them."""

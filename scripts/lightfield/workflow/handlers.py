@@ -29,6 +29,7 @@ from lightfield.workflow.jobs import (
     PACK,
     PAGE,
     RENDER,
+    SEQUENCE_PAGE,
     Job,
 )
 from lightfield.workflow.known_times import time_files
@@ -40,8 +41,8 @@ from lightfield.workflow.unfinished_views import unfinished_views
 
 # For more datasets than this, only the page of all datasets is named.
 MOST_PAGES = 12
-# A note names at most so many former members of a family.
-MOST_NAMES = 5
+# A note names at most so many folders that a family no longer has.
+MOST_PLACES = 5
 # What stands below the table of what jobs request of a cluster.
 REQUESTS_NOTE = (
     "mem_mb is the memory of a job in MB, and runtime its time limit in minutes. – is the "
@@ -205,13 +206,13 @@ class Handlers:
         self._print_pages(is_left)
         self._print_packages(is_left)
         self._print_families(is_left)
-        self._print_former_members()
+        self._print_former_places()
 
     def _print_failures(self) -> None:
         """Print what the run took, and why it ended."""
         self._print_summary()
         failures = "" if was_interrupted() else self.display.failures()
-        self._print_former_members()
+        self._print_former_places()
         print(self.display.end or failures or UNFINISHED, file=sys.stderr, flush=True)
 
     def _print_summary(self) -> None:
@@ -235,14 +236,24 @@ class Handlers:
             if receipt in plan.asked and is_left(receipt):
                 ends["not finished"].append(plan.shown(dataset.paths.folder))
             elif receipt in plan.asked:
-                ends[self._validity(dataset)].append(plan.shown(dataset.paths.page))
-        for state, paths in ends.items():
+                ends[self._validity(dataset)].append(plan.shown(self._page_of(dataset, is_left)))
+        for state, pages in ends.items():
+            paths = list(dict.fromkeys(pages))
             if len(paths) > MOST_PAGES:
                 index = "" if is_left(plan.receipt_path(INDEX.name)) else "/index.html"
                 all_of_them = plan.shown(f"{self._run.results}{index}")
                 paths = [f"{count(len(paths), 'dataset')}: {all_of_them}"]
             for path in paths:
                 print(f"{state}: {path}", file=sys.stderr)
+
+    def _page_of(self, dataset: Dataset, is_left: IsLeft) -> str:
+        """Return the page of a dataset. For a valid frame, this is the page of its sequence."""
+        sequence = {"scene": dataset.scene_folder, "rig": dataset.rig_name}
+        receipt = self._plan.receipt_path(SEQUENCE_PAGE.name.format(**sequence))
+        is_made = receipt in self._plan.asked and not is_left(receipt)
+        if dataset.sequence_page and is_made and self._plan.is_valid(dataset):
+            return dataset.sequence_page
+        return dataset.paths.page
 
     def _validity(self, dataset: Dataset) -> str:
         return "valid" if self._plan.is_valid(dataset) else "not valid"
@@ -263,15 +274,15 @@ class Handlers:
                 log = Path(self._run.log_of(planned.name))
                 print(log.read_text(encoding="utf-8").strip(), file=sys.stderr)
 
-    def _print_former_members(self) -> None:
-        """Print the members that the chosen families no longer have, but that are still there."""
+    def _print_former_places(self) -> None:
+        """Print which folders are of members or datasets that the chosen families lack now."""
         for folder in self._run.build.family_names:
-            if names := self._plan.former_members(folder):
-                more = f" and {len(names) - MOST_NAMES:,} more" if names[MOST_NAMES:] else ""
+            if places := self._plan.former_places(folder):
+                more = f" and {len(places) - MOST_PLACES:,} more" if places[MOST_PLACES:] else ""
                 print(
-                    f"note: {self._run.results}/{folder} still has "
-                    f"{count(len(names), 'former member')}: {', '.join(names[:MOST_NAMES])}{more}; "
-                    "snakemake --cores 1 prune removes what the family no longer has",
+                    f"note: {self._run.results}/{folder} has what the family no longer has: "
+                    f"{', '.join(places[:MOST_PLACES])}{more}; snakemake --cores 1 prune removes "
+                    "it",
                     file=sys.stderr,
                 )
 
@@ -291,7 +302,7 @@ class Handlers:
         if self._run.log_of("prune") in self.display.requests:
             self._print_removals()
         else:
-            self._print_former_members()
+            self._print_former_places()
         if is_refused:
             sys.exit(1)
 
@@ -322,10 +333,10 @@ class Handlers:
         return datasets[name].sequence_name if name in datasets else name
 
     def _print_removals(self) -> None:
-        """Print the folder of each member that a run with `prune` would remove."""
+        """Print each folder that a run with `prune` would remove."""
         for folder in self._run.build.family_names:
-            for name in self._plan.former_members(folder):
-                print(f"would be removed: {self._run.results}/{folder}/{name}", file=sys.stderr)
+            for place in self._plan.former_places(folder):
+                print(f"would be removed: {self._run.results}/{folder}/{place}", file=sys.stderr)
 
     def _print_requests(self, jobs: list[PlannedJob]) -> None:
         """Print what the jobs of a dry run would request of the cluster."""

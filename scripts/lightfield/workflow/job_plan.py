@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lightfield.configuration.dataset import Dataset
+from lightfield.configuration.scene_yaml import load_scene
 from lightfield.core.disk_space import check_folder
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, set_aside, special_kind, unreadable, write_text
@@ -40,7 +41,7 @@ from lightfield.workflow.jobs import (
     SEQUENCE_PAGE,
     Job,
 )
-from lightfield.workflow.member_record import former_members
+from lightfield.workflow.member_record import former_places
 from lightfield.workflow.run import HasWildcards, Run, one_of
 from lightfield.workflow.run_config import ending_run
 
@@ -295,11 +296,14 @@ class JobPlan:
             for batch in batches
         ]
 
-    def former_members(self, family: str) -> list[str]:
-        """Return the members that a family has built, but no longer has."""
-        members = itertools.chain.from_iterable(self.run.build.batches[family].values())
-        names = {member.name for member in members}
-        return former_members(Path(self.run.results, family), Path(self.receipts, family), names)
+    def former_places(self, family: str) -> list[str]:
+        """Return the folders of members and datasets that a family no longer has."""
+        build = self.run.build
+        names = {member.name for batch in build.batches[family].values() for member in batch}
+        rigs = load_scene(build.family_names[family]).rigs
+        return former_places(
+            Path(self.run.results, family), Path(self.receipts, family), names, rigs
+        )
 
     def receipt_path(self, job: str) -> str:
         return f"{self.receipts}/{job}{SUFFIX}"
@@ -428,7 +432,7 @@ class JobPlan:
         return f"python {self.run.scripts}/verify.py {folders} --work {self.run.work}"
 
     def prune_command(self, wildcards: HasWildcards) -> str:
-        """Return the command that removes former members of the chosen families."""
+        """Return the command that removes what the chosen families no longer have."""
         run = self.run
         families = [w for names in run.build.family_names.items() for w in ("--family", *names)]
         folders = f"--results {run.results} --work {run.work}"

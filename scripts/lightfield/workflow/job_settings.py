@@ -493,5 +493,13 @@ def corpus(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
     members = [member.name for batch in build.batches[folder].values() for member in batch]
     scene = load_scene(build.family_names[folder])
     look = shown_look(scene.developments.values(), scene.exports.selected.values())
-    settings = CorpusSettings.of(**dict(options), family=folder, members=sorted(members), look=look)
+    settings = CorpusSettings.of(
+        **dict(options),
+        family=folder,
+        members=sorted(members),
+        look=look,
+        description=scene.description,
+        licence=scene.licence,
+        credit=scene.credit,
+    )
     return "corpus", settings

@@ -10,6 +10,7 @@ from lightfield.configuration.family import RECEIPT, RECORD
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json
 from lightfield.core.paths import leads_inside
+from lightfield.formats.lightfield import NAME
 from lightfield.settings.base import checked
 
 # The key of the line of a member's history that says when it was built, and what that took.
@@ -94,15 +95,23 @@ def read_members(folder: Path, names: list[str] | None = None) -> list[MemberRec
     return [read_member(folder / name) for name in sorted(names)]
 
 
-def former_members(folder: Path, receipts: Path, names: Collection[str]) -> list[str]:
-    """Return the members that a family has built, but no longer has.
+def former_places(
+    folder: Path, receipts: Path, names: Collection[str], rigs: Collection[str]
+) -> list[str]:
+    """Return the folders of members and datasets that a family has built, but no longer has.
 
-    ``folder`` and ``receipts`` are the family's folders of results and of receipts. ``names`` are
-    the present members. A member that was killed while it was built has a receipt, but no record.
+    They are relative to ``folder``, the family's folder of results. ``receipts`` is its folder of
+    receipts. ``names`` are the present members, and each has a dataset of each of the ``rigs``.
     """
     records = {path.parent.name for path in folder.glob(f"*/{RECORD}")}
+    # A member that was killed while it was built has no record.
     begun = {path.parent.name for path in receipts.glob(f"*/{RECEIPT}.*")}
-    return sorted((records | begun).difference(names))
+    datasets = {
+        f"{path.parent.parent.name}/{path.parent.name}"
+        for path in folder.glob(f"*/*/{NAME}")
+        if path.parent.parent.name in names and path.parent.name not in rigs
+    }
+    return sorted((records | begun).difference(names) | datasets)
 
 
 def read_member(folder: Path) -> MemberRecord:

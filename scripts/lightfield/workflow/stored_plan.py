@@ -212,8 +212,8 @@ class StoredPlan(JobPlan):
         take = f"python {run.scripts}/take_dataset.py --store {shlex.quote(self.url)}"
         return f"{take} --work {run.work} {folders}" if folders else ":"
 
-    def former_members(self, family: str) -> list[str]:
-        """Return no members: the bundle of a batch has its present members alone."""
+    def former_places(self, family: str) -> list[str]:
+        """Return nothing: the bundle of a batch has its present members alone."""
         return []
 
     def prune_command(self, wildcards: HasWildcards) -> str:

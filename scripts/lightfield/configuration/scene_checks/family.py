@@ -15,6 +15,8 @@ def check(blocks: SceneBlocks) -> None:
     for key in ("flow", "mesh"):
         if getattr(blocks, key) is not None:
             raise ValueError(f"{key}: does not go with family")
+    if blocks.publish:
+        raise ValueError("publish: does not go with family; its corpus has the licence and credit")
     for name, rig in blocks.rigs.items():
         if rig.sequence:
             raise ValueError(f"rigs.{name}.frames: does not go with family")

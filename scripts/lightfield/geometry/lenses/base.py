@@ -107,10 +107,13 @@ class LensSettings(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class Lens(ABC):
-    """A projection on an image of ``width`` × ``height`` pixels.
+    """A projection on an image.
 
-    ``sensor_size`` is in mm (default: 36 wide, square pixels), ``principal_point`` in pixels
-    (default: the image's centre).
+    - ``width``: the image's width in pixels.
+    - ``height``: the image's height in pixels.
+    - ``sensor_size``: the sensor's width and height in mm. By default, it is 36 mm wide, and pixels
+      are square.
+    - ``principal_point``: in pixels. By default, it is the image's centre.
 
     The class of each lens defines:
 
