@@ -223,9 +223,65 @@ def test_a_plan_for_a_cluster_lists_what_jobs_request(tmp_path):
     rows = [line.split() for line in plan.stdout.splitlines()]
     limits = {row[0]: int(row[4]) for row in rows if row and row[0] in ("render", "validate")}
     assert set(limits) == {"render", "validate"} and max(limits.values()) <= 40
+    # No GPU was measured.
+    assert "GPU: taken as 64 cores" in plan.stdout and "not measured" in plan.stdout
     # This machine's own jobs are not submitted.
     here = snakemake(folder, "--dry-run", *arguments)
     assert "slurm_partition" not in here.stdout and "phase" in here.stdout
+    assert "64 cores" not in here.stdout
+
+
+def test_a_partition_that_ends_jobs_before_their_first_view_is_a_warning(tmp_path):
+    """A view takes 8.4 MP × 256 samples × 6 µs: 3 h 35 min of a core, or half of it on two."""
+    folder = checkout(tmp_path)
+    keys = ("--config", "preset=full", "scenes=[garden]", "rigs=LFCuboid_8panos")
+
+    def warnings(cores, *more):
+        options = ("-n", "--profile", "profiles/slurm", "--cores", cores)
+        plan = snakemake(folder, *options, *keys, *more)
+        assert plan.returncode == 0, plan.stderr
+        return [line for line in plan.stderr.splitlines() if "partition_minutes" in line]
+
+    (warning,) = warnings("2", "partition_minutes=40")
+    assert warning.startswith("warning: garden/LFCuboid_8panos: one view is expected to take ")
+    assert "1 h 47 min" in warning and " 40 min" in warning
+    least_cores = re.search(r"--cores (\d+)", warning)[1]
+    assert warnings(str(int(least_cores) - 1), "partition_minutes=40")
+    assert not warnings(least_cores, "partition_minutes=40")
+    assert not warnings("2")
+    # A GPU is expected to be as fast as 64 cores.
+    assert not warnings("2", "partition_minutes=40", "device=optix")
+
+
+def phases(folder, *arguments):
+    """Return the number of jobs of each phase in a plan of the smoke scene."""
+    plan = snakemake(folder, "-n", *arguments, "scenes=[smoke]", "preset=full")
+    assert plan.returncode == 0, plan.stderr
+    table = plan.stdout[plan.stdout.index("phase ") :].split("\n\n")[0]
+    return {phase: int(jobs) for phase, jobs, *_ in map(str.split, table.splitlines()[1:])}
+
+
+def test_a_plan_until_a_rule_counts_only_the_jobs_until_then(tmp_path):
+    folder = checkout(tmp_path / "plenoforge")
+    everything = phases(folder, "--config")
+    for rule, last in {"inventory": "scene", "render": "views", "reproject": "sensor"}.items():
+        counted = phases(folder, "--until", rule, "--config")
+        assert [*counted][-2:] == [last, "all"]
+        assert counted["all"] == sum(counted.values()) / 2 < everything["all"]
+    assert counted["views"] == everything["views"]
+
+
+def test_a_plan_with_a_storage_counts_all_jobs_and_lists_what_they_request(tmp_path):
+    everything = phases(checkout(tmp_path / "shared"), "--config")
+    store = tmp_path / "store"
+    options = ["--default-storage-provider", "fs", "--default-storage-prefix", str(store)]
+    options += ["--shared-fs-usage", "source-cache", "persistence"]
+    keys = ("--config", f"storage={store}", "cluster_jobs=10", "scenes=[smoke]", "preset=full")
+    plan = snakemake(checkout(tmp_path / "stored"), "-n", *options, *keys)
+    assert plan.returncode == 0, plan.stderr
+    rows = dict(line.split(maxsplit=1) for line in plan.stdout.splitlines() if line)
+    assert int(rows["all"].split()[0]) == everything["all"]
+    assert rows["validate"].split() == ["3", "1", "4,000", "120", "–", "–"]
 
 
 def test_ranges_of_requests_have_the_least_and_the_largest():

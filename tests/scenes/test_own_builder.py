@@ -5,6 +5,7 @@ import re
 import shutil
 import sys
 from pathlib import Path
+from textwrap import indent
 
 import numpy as np
 import pytest
@@ -22,6 +23,8 @@ PAGE = (ROOT / "docs/how-to/write-a-scene-in-python.md").read_text()
 # The scene and the YAML that the page shows.
 YAML = re.search(r"```yaml\n(.*?)```", PAGE, re.S)[1]
 SPIRAL = re.search(r"```python\n(.*?)```", PAGE, re.S)[1]
+# The lines that animate it.
+ANIMATION = re.search(r"## Animation\n.*?```python\n(.*?)```", PAGE, re.S)[1]
 RENDERED = """
 render: {samples: 1}
 rigs:
@@ -423,6 +426,28 @@ FILES = ["oak.png"]
     *scenes, modules, paths = lines[-4:]
     assert scenes == ["['Cube', 'called 1 with 4']"] * 2
     assert (modules, paths) == ("[]", "[]")
+
+
+def test_the_animation_of_the_page_moves_and_scales_its_object(folder, run_program):
+    text = SPIRAL + indent(ANIMATION, "    ")
+    result = build(run_program, folder, text, {"seed": 0, "balls": 1})
+    assert result.returncode == 0, result.stderr
+    program = written(
+        """
+import bpy
+bpy.ops.wm.open_mainfile(filepath="scene.blend")
+for frame in (1, 9, 17):
+    bpy.context.scene.frame_set(frame)
+    balloon = bpy.data.objects["balloon"]
+    height = round(balloon.matrix_world.translation.z, 5)
+    print("frame", frame, height, round(balloon.scale.x, 5))
+""",
+        "program.py",
+    )
+    # Blender prints other lines.
+    printed = run_program(folder / program, cwd=folder).stdout
+    frames = re.findall(r"^frame (.*)", printed, re.M)
+    assert frames == ["1 1.0 0.5", "9 1.4 0.75", "17 1.8 1.0"]
 
 
 # ---- the workflow -----------------------------------------------------------------------------

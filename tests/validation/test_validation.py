@@ -1480,6 +1480,22 @@ def test_the_program_needs_only_the_dataset(small_dataset: Path, run_program: An
     assert "failed: panorama/views; " in result.stdout
 
 
+def test_the_program_says_which_other_program_compares_the_checksums(
+    small_dataset: Path, run_program: Any
+) -> None:
+    sums = small_dataset / "sha256sums.txt"
+    sums.write_text(f"{'0' * 64}  lightfield.json\n")
+    result = run_program("validate.py", small_dataset)
+    assert ": valid: " in result.stdout
+    said = f"note: {sums}: is compared only by python scripts/verify.py {small_dataset}\n"
+    assert said in result.stderr
+    found = run_program("verify.py", small_dataset, check=False)
+    assert found.returncode == 1
+    assert re.search(r"lightfield\.json: .*sha256", found.stdout)
+    sums.unlink()
+    assert "verify.py" not in run_program("validate.py", small_dataset).stderr
+
+
 def test_the_program_writes_reproducible_bytes_and_correct_checksums(
     dataset: Path, tmp_path: Path, run_program: Any
 ) -> None:

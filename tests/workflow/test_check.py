@@ -58,12 +58,14 @@ def test_a_changed_setting_input_or_version_makes_a_job_outdated(folder):
     assert verdict(path, samples=4).outdated == ["scene.yaml"]
 
 
-def test_a_job_that_did_not_read_a_file_that_it_now_must_read_is_outdated(folder):
+def test_a_job_runs_for_a_file_that_it_has_not_read_but_is_not_called_outdated(folder):
     for name in ("scene.yaml", "places.json"):
         Path(name).write_text(name)
     path = make("a", "[]", ["scene.yaml"])
     jobs = JobCheck(Path("work"), Path("results"), lambda _: {}, {"stage": 1})
-    assert jobs.verdict(path, {}, ["scene.yaml", "places.json"]).outdated == ["places.json"]
+    found = jobs.verdict(path, {}, ["scene.yaml", "places.json"])
+    assert not found.is_fine and not found.outdated
+    assert found.unread == ["places.json"]
 
 
 def test_a_newer_receipt_is_a_reason_to_run_only_if_its_job_runs(folder):

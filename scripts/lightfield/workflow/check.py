@@ -37,18 +37,20 @@ NAME = "sums.json"
 class Verdict:
     """What the check found out about a job. A job without a reason to run is fine.
 
-    ``outdated`` has the settings and inputs that changed, and ``damaged`` the files. ``elsewhere``
-    is one of the files that the job made, if all of them lie in other folders than this build's.
+    ``outdated`` has the settings and inputs that changed, and ``damaged`` the files. ``unread`` has
+    the inputs that are new, which the job has not read yet. ``elsewhere`` is one of the files that
+    the job made, if all of them lie in other folders than this build's.
     """
 
     has_receipt: bool = True
     outdated: list[str] = field(default_factory=list)
     damaged: list[str] = field(default_factory=list)
+    unread: list[str] = field(default_factory=list)
     elsewhere: str | None = None
 
     @property
     def is_fine(self) -> bool:
-        return self.has_receipt and not self.outdated and not self.damaged
+        return self.has_receipt and not (self.outdated or self.damaged or self.unread)
 
 
 class Sums:
@@ -156,7 +158,7 @@ class JobCheck:
             return Verdict(has_receipt=False, elsewhere=strays[0] if is_moved else None)
         outdated = [*self._changed_settings(receipt, settings)]
         outdated += [name for name, digest in receipt.inputs.items() if self._sum(name) != digest]
-        outdated += [name for name in inputs if receipts.name_of(name) not in receipt.inputs]
+        unread = [name for name in inputs if receipts.name_of(name) not in receipt.inputs]
         oldest = os.stat(path).st_mtime_ns  # noqa: PTH116, a `Path` is slow for many files
         damaged = []
         for name, output in receipt.outputs.items():
@@ -169,7 +171,7 @@ class JobCheck:
                 if self.sums.of(name) != output.stamp.sha256:
                     damaged.append(name)
         self._oldest[path] = oldest
-        return Verdict(True, outdated, damaged)
+        return Verdict(True, outdated, damaged, unread)
 
     def _changed_settings(self, receipt: Receipt, settings: Mapping[str, Any]) -> Iterator[str]:
         """Yield the settings that are not as the receipt says, and the version of the stage."""

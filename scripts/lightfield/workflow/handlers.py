@@ -11,12 +11,12 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from lightfield.configuration.dataset import Dataset
+from lightfield.configuration.dataset import SPEED_OF_GPU, Dataset
 from lightfield.core.terminal import was_interrupted
 from lightfield.core.units import count, duration
 from lightfield.planning.cost import JOB, Cost, estimate_of, rendering
 from lightfield.planning.estimate import Estimate
-from lightfield.planning.forecast import Work, forecast, requests_table
+from lightfield.planning.forecast import Request, Work, forecast, requests_table
 from lightfield.planning.phases import SENSOR_PHASE
 from lightfield.workflow import run_lock
 from lightfield.workflow.job_plan import JobPlan, PlannedJob
@@ -47,9 +47,14 @@ MOST_PLACES = 5
 REQUESTS_NOTE = (
     "mem_mb is the memory of a job in MB, and runtime its time limit in minutes. – is the "
     "cluster's default.\n"
-    "A limit is several times the expected time. Jobs of seconds run beside Snakemake, and are "
-    "not listed.\n"
+    "A limit is several times the expected time. Jobs of seconds, and of pages, run beside "
+    "Snakemake, and are not listed.\n"
     "To change one: --set-resources render:mem_mb=16000. See docs/how-to/tune-a-cluster.md."
+)
+# What stands below it if jobs request a GPU.
+GPU_NOTE = (
+    f"GPU: taken as {SPEED_OF_GPU} cores in the run times and the numbers of jobs, not measured. "
+    "CPU time is a core's."
 )
 # The message if a run ends early, and no job has failed.
 UNFINISHED = "error: the run was stopped before its last job: the same command goes on"
@@ -295,16 +300,28 @@ class Handlers:
         """
         self._plan.announce_changes()
         is_refused = self._checks.announce_refusals()
-        jobs = sorted(self._plan.planned_jobs(), key=lambda planned: ORDER[planned.job])
+        jobs = self._jobs_of_dry_run()
         print(forecast([self._work_of(planned) for planned in jobs]))
         if self._run.cluster:
             self._print_requests(jobs)
-        if self._run.log_of("prune") in self.display.requests:
+        if self._request_of("prune"):
             self._print_removals()
         else:
             self._print_former_places()
         if is_refused:
             sys.exit(1)
+
+    def _jobs_of_dry_run(self) -> list[PlannedJob]:
+        """Return the jobs that Snakemake would run, in the order of the work.
+
+        With --until these are fewer than the jobs that must run.
+        """
+        jobs = [each for each in self._plan.planned_jobs() if self._request_of(each.name)]
+        return sorted(jobs, key=lambda planned: ORDER[planned.job])
+
+    def _request_of(self, name: str) -> Request | None:
+        """Return what a job would request, by its name. None if Snakemake would not run it."""
+        return self.display.requests.get(self._plan.shown(self._run.log_of(name)))
 
     def _work_of(self, planned: PlannedJob) -> Work:
         """Return a job's part of the forecast. Views that earlier runs finished do not count."""
@@ -340,11 +357,11 @@ class Handlers:
 
     def _print_requests(self, jobs: list[PlannedJob]) -> None:
         """Print what the jobs of a dry run would request of the cluster."""
-        requests = self.display.requests
-        logs = [self._run.log_of(each.name) for each in jobs if not each.job.is_local]
-        found = [requests[log] for log in logs if log in requests]
-        if found:
+        requests = [self._request_of(each.name) for each in jobs if not each.job.is_local]
+        if found := [request for request in requests if request]:
             print(f"\n{requests_table(found)}\n\n{REQUESTS_NOTE}")
+            if self._run.gpus:
+                print(GPU_NOTE)
 
 
 def announce_stop() -> None:

@@ -1,6 +1,7 @@
 """Checks, notes and removals before the first job."""
 
 import functools
+import math
 import resource
 import subprocess
 import sys
@@ -9,11 +10,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lightfield.configuration.blend_lock import expected_blend
+from lightfield.configuration.dataset import Dataset
 from lightfield.core import disk_space, leftovers, units
 from lightfield.core.disk_space import Need, check_folder
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.planning.cost import light_group_count, temporary_bytes, view_cost
+from lightfield.planning.cost import light_group_count, rendering, temporary_bytes, view_cost
+from lightfield.planning.time_limits import limit_of_render
 from lightfield.stages.measurement import RENDERS_ON
 from lightfield.workflow import presence
 from lightfield.workflow.build import Wildcards
@@ -52,6 +55,7 @@ class StartChecks:
         self._check_device()
         self._check_memory()
         self._check_disk_space()
+        self._check_run_times()
         self._check_times()
 
     def announce_refusals(self) -> bool:
@@ -61,6 +65,7 @@ class StartChecks:
             self._check_device,
             self._check_memory,
             self._check_disk_space,
+            self._check_run_times,
             self._check_times,
         ]
         planned_jobs = self._plan.planned_jobs()
@@ -150,6 +155,17 @@ class StartChecks:
         size = at_once * view_bytes
         return [] if disk_space.fast_folder(size) else [Need(Path(tempfile.gettempdir()), size)]
 
+    def _check_run_times(self) -> None:
+        """Warn of views that take longer than the cluster's partition lets a job run."""
+        run = self._run
+        planned_jobs = self._plan.planned_jobs()
+        renders = [p for p in planned_jobs if p.job is RENDER and not is_import(run, p)]
+        datasets = (run.asked(run.build.dataset, planned.names) for planned in renders)
+        # The frames of a sequence take about the same time.
+        for name, dataset in {each.sequence_name: each for each in datasets}.items():
+            if problem := too_short_partition(dataset):
+                print(f"warning: {name}: {problem}", file=sys.stderr)
+
     def _check_times(self) -> None:
         """Raise `UserError` for a file that jobs read, and whose time is in the future.
 
@@ -178,6 +194,23 @@ class StartChecks:
                 f"removed {len(removed)} files and folders that killed runs have left",
                 file=sys.stderr,
             )
+
+
+def too_short_partition(dataset: Dataset) -> str | None:
+    """Return a warning if a job of one view is expected to end at its time limit. None if not."""
+    cluster, limit = dataset.cluster, limit_of_render(dataset)
+    if cluster is None or limit is None:
+        return None
+    seconds = rendering(dataset, views=1).seconds
+    least_cores = math.ceil(seconds / (60 * limit))
+    if least_cores <= cluster.speed:
+        return None
+    more_cores = "" if cluster.has_gpus else f"more CPUs for each job (--cores {least_cores}), or "
+    return (
+        f"one view is expected to take {units.duration(seconds / cluster.speed)}, and a job that "
+        f"renders may take {limit} min, so it would end before its first view: choose {more_cores}"
+        "a longer partition (partition_minutes)"
+    )
 
 
 def explain_full_disk() -> None:
