@@ -163,7 +163,6 @@ def test_a_blend_without_its_texture_gets_a_yaml_that_builds(project):
         image.source = "FILE"
         image.filepath = f"//{name}"
         material = bpy.data.materials.new(name)
-        material.use_nodes = True
         node = material.node_tree.nodes.new("ShaderNodeTexImage")
         node.image = image
         shader = material.node_tree.nodes["Principled BSDF"]
