@@ -870,6 +870,19 @@ EXPLAINED = [
         ["fisheye"],
         "exports.instant_ngp.sources: is 'fisheye'; must be of views, perspective",
     ),
+    # Names that other programs have for the same.
+    *(
+        (f"rigs.LFSphere.{key}", name, f"; did you mean {right}?")
+        for key, name, right in (
+            ("camera.lens", "perspective", "rectilinear"),
+            ("camera.lens", "Pinhole", "rectilinear"),
+            ("camera.lens", "fisheye", "equidistant"),
+            ("camera.lens", "panorama", "equirectangular"),
+            ("camera.lens", "rectlinear", "rectilinear"),
+            ("type", "dome", "hemisphere"),
+            ("type", "hemispere", "hemisphere"),
+        )
+    ),
     ("render.camera_motion", {}, "render.camera_motion: must have travel, turn, or both"),
     (
         "render",
@@ -913,6 +926,11 @@ EXPLAINED = [
         "exports.nerfstudio.look: is for EXR sources; give look to the reprojection perspective",
     ),
     (
+        "exports.nerfstudio",
+        {"sources": ["view"], "look": "AgX"},
+        "exports.nerfstudio.sources: is 'view'; must be of views, perspective; did you mean views?",
+    ),
+    (
         "exports",
         {"point_cloud": {"sources": ["views"], "look": "AgX", "reinhard": 5}},
         "exports.point_cloud.reinhard: does not go with look",
@@ -939,6 +957,11 @@ EXPLAINED = [
         "sensor.sources: is 'fisheye'; must be of views, perspective",
     ),
     ("sensor", {"rigs": ["LFSpher"]}, "sensor.rigs: there is no rig 'LFSpher'; did you mean"),
+    (
+        "sensor",
+        {"sources": ["perspective"], "rigs": ["LFSpher"]},
+        "sensor.rigs: there is no rig 'LFSpher'; did you mean LFSphere?",
+    ),
     (
         "sensor",
         {"sources": ["perspective"], "rigs": ["LFCuboid"]},

@@ -129,7 +129,8 @@ def test_an_invalid_dataset_gets_a_page_but_no_checksums_until_it_is_repaired(sm
     for _ in range(2):
         terminal = failing(folder, "--cores", "2", "smoke", archive)
         assert terminal.splitlines()[-2:] == [
-            f"checksums failed: error: smoke/{CUBOID.name} is not valid: {nan}: see {page_path}",
+            f"checksums failed: error: smoke/{CUBOID.name} is not valid, and so gets no checksums: "
+            f"{nan}: see {page_path}",
             f"  log: work/logs/smoke/{CUBOID.name}/checksums.log",
         ]
         assert json.loads((dataset / "validation.json").read_text())["valid"] is False

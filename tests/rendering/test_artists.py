@@ -48,8 +48,9 @@ rigs:
 
 TAKEN = {
     "interior": "frame 1, the file's · 1 sample a pixel (the file has 4096) · camera Corner "
-    "(24 mm) ignored · compositor ignored · adaptive sampling off · denoising off · view "
-    "transform AgX: not applied; look: file applies it · 1 texture missing: poster.png",
+    "(24 mm) ignored: the rigs place the cameras · compositor ignored · adaptive sampling off · "
+    "denoising off · view transform AgX: not applied; look: file applies it · "
+    "1 texture missing: poster.png",
     "character": "frame 24, the file's · view layers Main and Stage of 2 in one picture · "
     "1 sample a pixel (the file has 256) · camera Wide (35 mm) taken · adaptive sampling off · "
     "denoising off · motion blur off · view transform AgX: not applied; look: file applies it",

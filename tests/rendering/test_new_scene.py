@@ -115,6 +115,102 @@ def test_a_blend_without_a_camera(project):
     np.testing.assert_allclose(distances, distances[0], rtol=1e-5)
 
 
+def test_a_model_without_its_texture_gets_a_yaml_that_builds(project):
+    """The YAML renders without the texture, and the program names it."""
+    points = np.float32([0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1]).tobytes()
+    views = [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 24}]
+    accessor = {"componentType": 5126, "count": 3}
+    content = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [
+            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}
+        ],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "textures": [{"source": 0}],
+        "images": [{"uri": "lost.png"}],
+        "buffers": [{"uri": "points.bin", "byteLength": 60}],
+        "bufferViews": views,
+        "accessors": [
+            {**accessor, "bufferView": 0, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
+            {**accessor, "bufferView": 1, "type": "VEC2"},
+        ],
+    }
+    (project / "points.bin").write_bytes(points)
+    (project / "bare.gltf").write_text(json.dumps(content))
+    said, content = written(project, "bare", "bare.gltf")
+    (note,) = [line for line in said.splitlines() if line.startswith("note: ")]
+    assert "bare.gltf: " in note and "lost.png" in note
+    assert content["scene"]["allow_missing"] is True
+    built(project, said, "around")
+
+
+def test_a_blend_without_its_texture_gets_a_yaml_that_builds(project):
+    """What is hidden needs no texture."""
+    import bpy
+
+    from lightfield.rendering.scenes import blend_file
+
+    blend_file.open_scene(project / "alone.blend")
+    (cube,) = [obj for obj in bpy.data.objects if obj.type == "MESH"]
+    hidden = cube.copy()
+    hidden.data = cube.data.copy()
+    hidden.hide_render = True
+    bpy.context.collection.objects.link(hidden)
+    for obj, name in ((cube, "lost.png"), (hidden, "unused.png")):
+        image = bpy.data.images.new(name, 4, 4)
+        image.source = "FILE"
+        image.filepath = f"//{name}"
+        material = bpy.data.materials.new(name)
+        node = material.node_tree.nodes.new("ShaderNodeTexImage")
+        node.image = image
+        shader = material.node_tree.nodes["Principled BSDF"]
+        material.node_tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+        obj.data.materials.append(material)
+    blend_file.save_scene(project / "bare.blend")
+    said, content = written(project, "torn", "bare.blend", "--scene", "torn")
+    (note,) = [line for line in said.splitlines() if line.startswith("note: ")]
+    assert "bare.blend: 1 of the files" in note and "lost.png" in note and "unused" not in note
+    assert content["scene"]["allow_missing"] is True
+    built(project, said, "around")
+
+
+@pytest.mark.parametrize(
+    ("view", "look", "title"),
+    [
+        ("AgX", "AgX - Punchy", "AgX - Punchy"),
+        ("Filmic", "None", "Filmic"),
+        ("Standard", "None", None),
+    ],
+)
+def test_the_look_of_a_blend_is_offered(project, view, look, title):
+    """Without its comment signs, the offer is a reprojection with this look."""
+    import bpy
+
+    from lightfield.rendering.scenes import blend_file
+
+    blend_file.open_scene(project / "alone.blend")
+    settings = bpy.context.scene.view_settings
+    settings.view_transform, settings.look = view, look
+    name = f"shown_{view}"
+    blend_file.save_scene(project / f"{name}.blend")
+    _, content = written(project, name, f"{name}.blend")
+    assert "reprojections" not in content and "allow_missing" not in content["scene"]
+    text = (project / f"configs/scenes/{name}.yaml").read_text()
+    lines = text.splitlines()
+    if title is None:
+        assert "look" not in text.partition("rigs:")[2].replace("look at", "")
+        return
+    start = lines.index("# reprojections:")
+    assert lines[start + 1].endswith(f": {title}")
+    for number in (start, start + 1):
+        lines[number] = lines[number].removeprefix("# ")
+    with chdir(project):
+        scene = check_scene("\n".join(lines), name)
+    assert scene.reprojections["pictures"].look == "file"
+
+
 def test_a_folder_of_views(project):
     """The views are SILVR's: fisheyes, which an export needs through a perspective lens."""
     (project / "configs/scenes/wide.yaml").write_text(

@@ -123,6 +123,10 @@ def draw(folder, rig, output, panorama=None):
     ReportFigures(settings=settings, dataset=folder, panorama=panorama, output=output).run()
 
 
+# What the time of full size follows from.
+FINISHED = "11 finished views of 64 × 64 pixels with 4 samples"
+
+
 @pytest.fixture(scope="module")
 def sphere(tmp_path_factory):
     """The page of a sphere of cameras with every section, and its lightfield.json."""
@@ -145,7 +149,12 @@ def sphere(tmp_path_factory):
         {
             "stages": [{"stage": "render", "jobs": 1, "wall_seconds": 200.0, "bytes": 2_500_000}],
             "energy_kwh": 0.25,
-            "extrapolation": {"core_hours": 12.03, "core_hours_uncertainty": 1.5},
+            "extrapolation": {
+                "core_hours": 12.03,
+                "core_hours_uncertainty": 1.5,
+                "rendering": f"full size: rendering 25 views takes 11 h of one core, by {FINISHED}",
+                "basis": f"rendering by {FINISHED}; on the processor",
+            },
         },
     )
     measured = folder.parent / "benchmarks"
@@ -203,6 +212,7 @@ def test_the_page_loads_completely_from_one_file(sphere, show):
     for part in ("3 min 20 s", "2.5 MB", "0.25 kWh", "12 h"):
         assert part in text
     assert "±" not in text
+    assert text.count(FINISHED) == 1
     for part in ("180° × 180°", "Frame\n7", "Pixels without a hit\n0 %", "snakemake --cores all"):
         assert part in text
     assert YAML.strip() in tab.text_content("#rebuild pre >> nth=1")

@@ -159,7 +159,8 @@ def _camera(camera: Settings | None, is_taken: bool) -> Iterator[str]:
         return
     lens = camera["lens"]
     length = f" ({lens['lens']:g} mm)" if lens["type"] == "PERSP" else ""
-    yield f"camera {camera['name']}{length} {'taken' if is_taken else 'ignored'}"
+    use = "taken" if is_taken else "ignored: the rigs place the cameras"
+    yield f"camera {camera['name']}{length} {use}"
     near, far = camera["clip"]
     if is_taken and (near > _BLENDERS_CLIP[0] or far < _BLENDERS_CLIP[1]):
         yield f"clip planes at {near:g} and {far:g} m ignored"

@@ -31,9 +31,8 @@ def open_views(reprojection: str = "", folder: Any = Path(__file__).parent) -> "
     names = {file.parent.name for file in folder.glob(f"{frame}/*/lightfield.json")}
     for file in folder.glob(f"{frame}/{reprojection or '.'}/lightfield.json"):
         content = json.loads(file.read_text("utf-8"))
-        for number, view in enumerate(content["frames"]):
-            place = len(str(file)), file, number
-            views[place] = PlainView(content | view, reprojection, file.parent)
+        for nth, view in enumerate(content["frames"]):
+            views[len(str(file)), file, nth] = PlainView(content | view, reprojection, file.parent)
     sums = "".join(file.read_text("utf-8") for file in folder.glob("sha256sums.txt"))
     for shard in [] if views else re.findall(r"\S+-\d+\.tar", sums) or folder.glob("*-[0-9]*.tar"):
         with tarfile.open(folder / shard) as tar:
@@ -191,8 +190,7 @@ def to_rec_709(channels: Any, header: Any) -> Any:
     """Return linear colour (height, width, 3). White stays white, by Bradford."""
     colour = np.stack([channels[name] for name in "RGB"], axis=-1).astype(np.float32)
     chromaticities, spaces = header.get("chromaticities", REC_709), []
-    for space in (chromaticities, REC_709):
-        x, y = np.reshape(space, (4, 2)).T
+    for x, y in np.reshape([chromaticities, REC_709], (2, 4, 2)).swapaxes(1, 2):
         cones = BRADFORD @ np.stack([x / y, np.ones(4), (1 - x - y) / y])
         spaces.append(cones[:, :3] * np.linalg.solve(cones[:, :3], cones[:, 3]) / cones[:, 3:])
     is_rec_709 = np.allclose(chromaticities, REC_709, rtol=0, atol=1e-4)

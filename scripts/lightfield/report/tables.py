@@ -219,7 +219,8 @@ def costs(path: Path) -> dict[str, Any] | None:
 
     - ``tables``: by their titles.
     - ``facts``, ``full``: pairs of title and text. ``full`` is extrapolated to the full size.
-    - ``notes``, ``basis``: how ``facts`` and ``full`` were counted.
+    - ``notes``: how ``facts`` were counted.
+    - ``basis``: how ``full`` was counted. None without it.
     """
     if not path.is_file():
         return None
@@ -237,7 +238,7 @@ def costs(path: Path) -> dict[str, Any] | None:
         "notes": _sentences(facts),
         # An extrapolation is exact to two digits at most.
         "full": _with_units({name: _two_digits(value) for name, value in full.items()}),
-        "basis": _sentences(full),
+        "basis": full.get("basis"),
     }
 
 

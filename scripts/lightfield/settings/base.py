@@ -143,6 +143,8 @@ Vector = TypeAliasType(
 )
 # A file that has more mistakes is probably another kind of file.
 _MOST_PROBLEMS = 10
+# Names that other programs have for values, in lower case, and the names here.
+OTHER_NAMES: dict[str, str] = {}
 # What messages and the reference say instead of a regular expression.
 MEANINGS: dict[str, str] = {}
 
@@ -177,7 +179,11 @@ Name = Annotated[
 
 def suggestion(name: str, allowed: Iterable[str]) -> str:
     """Return ``; did you mean …?``, or nothing if no allowed name is similar."""
-    close = difflib.get_close_matches(name, list(allowed), n=1)
+    allowed_names = list(allowed)
+    other = OTHER_NAMES.get(name.lower())
+    if other in allowed_names:
+        return f"; did you mean {other}?"
+    close = difflib.get_close_matches(name, allowed_names, n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 
@@ -273,7 +279,8 @@ def _problem(errors: list[ErrorDetails], content: Any) -> str:
             name = context["discriminator"].strip("'")
             kind = ".".join(filter(None, [key, name]))
             allowed_tags = context["expected_tags"].replace("'", "")
-            return f"{kind}: is {_shown(value[name])}; must be one of {allowed_tags}"
+            hint = suggestion(context["tag"], allowed_tags.split(", "))
+            return f"{kind}: is {_shown(value[name])}; must be one of {allowed_tags}{hint}"
     if error["loc"][-1:] == ("[key]",):
         # `path` has no rigs that are somebody else's folders, so use the error's own location.
         *parents, name, _ = error["loc"]

@@ -118,7 +118,8 @@ def publish(job: PublishChecksums) -> None:
     validation = read_keys(job.validation, "validate.py", "valid", "dataset", "checks")
     if not validation["valid"]:
         raise UserError(
-            f"{validation['dataset']} is not valid: {causes(validation)}: see {job.page}"
+            f"{validation['dataset']} is not valid, and so gets no checksums: "
+            f"{causes(validation)}: see {job.page}"
         )
     outputs = receipts.made_in(
         job.output.parent, [*job.settings.inputs, job.validation], job.work_folder

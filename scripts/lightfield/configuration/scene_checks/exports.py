@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from lightfield.configuration.scene_blocks import SceneBlocks, look_of
-from lightfield.configuration.scene_checks.names import check_rigs
+from lightfield.configuration.scene_checks.names import check_rigs, check_sources
 from lightfield.core.names import VIEWS
 from lightfield.exporters.base import NO_DEPTH, NOT_EXR, Export
 from lightfield.formats import light_groups, published
@@ -23,18 +23,14 @@ def _check_export(blocks: SceneBlocks, export_key: str, export: Export) -> None:
     _check_joined_rigs(blocks, rigs_key, export.joined_rigs)
     key = f"{export_key}.sources"
     developments = blocks.developments
-    allowed_sources = [VIEWS, *developments]
+    check_sources(key, export.sources, developments)
     if look_of(export) and not any(
-        source == VIEWS or "exr" in developments[source].formats
-        for source in export.sources
-        if source in allowed_sources
+        source == VIEWS or "exr" in developments[source].formats for source in export.sources
     ):
         source = export.sources[0]
         of_look = f"the reprojection {source}" if source in blocks.reprojections else "sensor"
         raise ValueError(f"{export_key}.look: is for EXR sources; give look to {of_look}")
     for source in export.sources:
-        if source not in allowed_sources:
-            raise ValueError(f"{key}: is {source!r}; must be of {', '.join(allowed_sources)}")
         reprojection = None if source == VIEWS else developments[source]
         if reprojection and reprojection.relight == light_groups.EACH:
             raise ValueError(

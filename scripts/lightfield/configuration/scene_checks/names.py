@@ -1,9 +1,10 @@
-"""Checks names of folders, and names of rigs that a block chooses."""
+"""Checks names of folders, and names of rigs and sources that a block chooses."""
 
 import re
 from collections.abc import Iterable, Set
 
 from lightfield.configuration.scene_blocks import SceneBlocks
+from lightfield.core.names import VIEWS
 from lightfield.settings.base import suggestion
 
 # Names of files, and of a sequence's frames, beside the folders of rigs and reprojections.
@@ -22,3 +23,12 @@ def check_rigs(blocks: SceneBlocks, key: str, names: Iterable[str]) -> None:
         if name not in blocks.rigs:
             hint = suggestion(name, blocks.rigs)
             raise ValueError(f"{key}: there is no rig {name!r}{hint}")
+
+
+def check_sources(key: str, sources: Iterable[str], folders: Iterable[str]) -> None:
+    """Check that sources are the views, or of the ``folders`` that hold other versions of them."""
+    allowed_sources = [VIEWS, *folders]
+    for source in sources:
+        if source not in allowed_sources:
+            hint = suggestion(source, allowed_sources)
+            raise ValueError(f"{key}: is {source!r}; must be of {', '.join(allowed_sources)}{hint}")

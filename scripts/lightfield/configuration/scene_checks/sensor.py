@@ -1,8 +1,7 @@
 """Checks the sensor with the views that it develops."""
 
 from lightfield.configuration.scene_blocks import SceneBlocks
-from lightfield.core.names import VIEWS
-from lightfield.settings.base import suggestion
+from lightfield.configuration.scene_checks.names import check_rigs, check_sources
 
 
 def check(blocks: SceneBlocks) -> None:
@@ -10,12 +9,9 @@ def check(blocks: SceneBlocks) -> None:
     sensor = blocks.sensor
     if sensor is None:
         return
-    allowed_sources = [VIEWS, *blocks.reprojections]
+    check_sources("sensor.sources", sensor.sources, blocks.reprojections)
+    check_rigs(blocks, "sensor.rigs", sensor.rigs or ())
     for source in sensor.sources:
-        if source not in allowed_sources:
-            raise ValueError(
-                f"sensor.sources: is {source!r}; must be of {', '.join(allowed_sources)}"
-            )
         if sensor.sources.count(source) > 1:
             raise ValueError(f"sensor.sources: must name {source} once")
         original = blocks.reprojections.get(source)
@@ -31,10 +27,5 @@ def check(blocks: SceneBlocks) -> None:
         for name in sensor.folders(source):
             if name in blocks.reprojections:
                 raise ValueError(f"reprojections.{name}: the name is taken by sensor")
-    for rig_name in sensor.rigs or ():
-        if rig_name not in blocks.rigs:
-            raise ValueError(
-                f"sensor.rigs: there is no rig {rig_name!r}{suggestion(rig_name, blocks.rigs)}"
-            )
     if blocks.render and blocks.render.transparent:
         raise ValueError("sensor: does not go with render.transparent")

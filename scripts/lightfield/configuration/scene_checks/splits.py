@@ -14,9 +14,9 @@ def check(blocks: SceneBlocks) -> None:
     training = next((name for name, rig in split_rigs.items() if rig.split == "train"), None)
     if training is None:
         name = next(iter(split_rigs))
-        raise ValueError(f"rigs.{name}.split: is {split_rigs[name].split}, but no rig trains")
+        raise _lacks_part(name, str(split_rigs[name].split), "train")
     if not any(rig.split == "test" for rig in split_rigs.values()):
-        raise ValueError(f"rigs.{training}.split: is train, but no rig tests")
+        raise _lacks_part(training, "train", "test")
     for name, rig in split_rigs.items():
         for key in ("camera", "frames"):
             if getattr(rig, key) != getattr(split_rigs[training], key):
@@ -28,6 +28,14 @@ def check(blocks: SceneBlocks) -> None:
         if export.joins_split:
             key = f"exports.{name}.{'together' if export.joined_rigs else 'rigs'}"
             _check_whole_split(blocks, key, split_rigs.keys(), export.chosen_rigs)
+
+
+def _lacks_part(rig_name: str, part: str, missing_part: str) -> ValueError:
+    """Return the error that no rig has the part that belongs to the part of a rig."""
+    return ValueError(
+        f"rigs.{rig_name}.split: is {part}, but no rig has split: {missing_part}; give it to one. "
+        f"Or give {rig_name} {{every: 8}}, which splits only its own rig"
+    )
 
 
 def _check_whole_split(

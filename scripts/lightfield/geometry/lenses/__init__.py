@@ -11,7 +11,7 @@ from typing_extensions import TypeAliasType
 from lightfield.core.errors import UserError
 from lightfield.geometry.lenses.base import LENSES, MOST_PIXELS, Array, Lens, LensSettings, pair
 from lightfield.geometry.lenses.rectilinear import FileSettings
-from lightfield.settings.base import checked
+from lightfield.settings.base import OTHER_NAMES, checked
 
 __all__ = [
     "LENSES",
@@ -25,6 +25,12 @@ __all__ = [
 
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
+
+OTHER_NAMES.update(
+    dict.fromkeys(("perspective", "persp", "pinhole"), "rectilinear")
+    | {"fisheye": "equidistant", "opencv_fisheye": "kannala_brandt"}
+    | dict.fromkeys(("panorama", "panoramic", "spherical", "latlong"), "equirectangular")
+)
 
 _MODELS: tuple[type[LensSettings], ...] = (
     *(lens.Settings for lens in LENSES.values() if lens.Settings),

@@ -25,7 +25,7 @@ from lightfield.geometry.rigs.rig import Pose, Rig
 from lightfield.geometry.rigs.ring import Ring
 from lightfield.geometry.rigs.sphere import Sphere
 from lightfield.geometry.rigs.spiral import Spiral
-from lightfield.settings.base import checked
+from lightfield.settings.base import OTHER_NAMES, checked
 
 __all__ = [
     "AnyRig",
@@ -43,6 +43,10 @@ __all__ = [
     "fitted",
     "from_settings",
 ]
+
+OTHER_NAMES.update(
+    {"dome": "hemisphere", "wall": "plane", "circle": "ring", "orbit": "ring", "helix": "spiral"}
+)
 
 AnyRig = Annotated[
     Plane

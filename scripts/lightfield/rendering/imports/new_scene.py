@@ -20,8 +20,15 @@ from lightfield.formats.lightfield import NAME
 from lightfield.geometry.lenses.base import LensSettings
 from lightfield.geometry.rigs import from_settings
 from lightfield.geometry.rotations import Floats, euler_to_matrix, matrix_to_euler
+from lightfield.imaging import blender_looks
 from lightfield.rendering.imports import model
-from lightfield.rendering.inspection import blend_facts, clearance
+from lightfield.rendering.inspection import (
+    blend_facts,
+    clearance,
+    external_files,
+    inventory,
+    inventory_file,
+)
 from lightfield.rendering.scenes import blend_file
 from lightfield.rendering.scenes.render_graph import in_render
 from lightfield.rendering.setup import viewport
@@ -37,13 +44,18 @@ _STEP = 1 / 50
 _TRIES = 6
 # So many rays to a side of the image find how far away a camera sees something.
 _RAYS = 5
+# Without it, no run renders a file that lacks others.
+_ALLOW_MISSING = "  allow_missing: true  # render in spite of the note of new_scene.py\n"
+# How Blender shows pictures that have no look.
+_PLAIN = {"view": "Standard", "look": blender_looks.NO_LOOK, "exposure": 0, "gamma": 1}
 
 
 class _Description(NamedTuple):
-    """What a file is, in words, and the blocks of its scene YAML."""
+    """What a file is, in words, the blocks of its scene YAML, and what the file lacks."""
 
     words: str
     blocks: str
+    missing: str | None = None
 
 
 def write(job: NewScene) -> None:
@@ -62,6 +74,8 @@ def write(job: NewScene) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+    if description.missing:
+        print(f"note: {description.missing}. The YAML allows it; mend it, and remove this key")
     command = f"snakemake {_place()}--cores {processors.available()} --config scenes={name}"
     print(
         f"{path} written: {description.words}\n"
@@ -111,7 +125,7 @@ def _described(file: Path, export: str | None) -> _Description:
 
 
 def _of_model(file: Path, export: str | None) -> _Description:
-    record = model.make_scene(ImportSettings(model=str(file)), file.parent)
+    record, missing = _imported(file)
     side = 1 / record["placement"]["scale"]
     sides = _sides(np.array(record["box"]) * side)
     # OBJ, PLY and STL do not name their unit.
@@ -123,16 +137,30 @@ def _of_model(file: Path, export: str | None) -> _Description:
   model: {_flow(_relative(file))}
   unit: {unit}
   light: softboxes   # or studio, courtyard and others, or a path of an .hdr
-
+{_ALLOW_MISSING if missing else ""}
 """
     render = _render("  transparent: true  # without a background\n")
     around = _around([_SIDE, _SIDE])
     blocks = scene + render + around + _exports(export, "views")
-    return _Description(f"{file.name}, a model of {sides}, with cameras around it", blocks)
+    words = f"{file.name}, a model of {sides}, with cameras around it"
+    return _Description(words, blocks, missing)
+
+
+def _imported(file: Path) -> tuple[dict[str, Any], str | None]:
+    """Return the record of a model's import, and what it lacks. Raises `UserError`."""
+    try:
+        return model.make_scene(ImportSettings(model=str(file)), file.parent), None
+    except UserError as error:
+        refusal = str(error)
+    # A model that is refused for something else is refused again.
+    settings = ImportSettings(model=str(file), allow_missing=True)
+    return model.make_scene(settings, file.parent), refusal
 
 
 def _of_blend(file: Path, export: str | None) -> _Description:
+    external_files.refuse_damaged_alembic(file)
     blend_file.open_scene(file)
+    external_files.refuse_special(file)
     facts = blend_facts.facts([])
     box = in_render(clearance.surface_box)
     if box is None or not np.isfinite(box).all():
@@ -141,14 +169,19 @@ def _of_blend(file: Path, export: str | None) -> _Description:
     resolution = [2 * max(1, round(_SIDE / 2 * side / max(size))) for side in size]
     viewport.show_what_is_rendered()
     front = _front(facts, resolution, box)
+    # Last, because it removes what is not rendered.
+    missing_files = inventory.missing_files([facts["frame"]])
     scene = f"""scene:
   blend: {_flow(_relative(file))}
   frame: file        # the frame at which the file was saved
-
+{_ALLOW_MISSING if missing_files else ""}
 """
-    blocks = scene + _render("") + (front or _around(resolution)) + _exports(export, "views")
+    rig = front or _around(resolution)
+    blocks = scene + _render("") + rig + _pictures(facts) + _exports(export, "views")
     where = "around its own camera" if front else "around what it shows"
-    return _Description(f"{file.name}, a .blend of {_sides(box)} m, with cameras {where}", blocks)
+    words = f"{file.name}, a .blend of {_sides(box)} m, with cameras {where}"
+    missing = f"{file}: {inventory_file.missing_text(file, missing_files)}"
+    return _Description(words, blocks, missing if missing_files else None)
 
 
 def _of_views(folder: Path, export: str | None) -> _Description:
@@ -266,6 +299,21 @@ def _is_free(settings: dict[str, Any]) -> bool:
     distances, box = clearance.surroundings(positions)
     enclosing = clearance.enclosing_objects(clearance.enclosures(positions, box))
     return not clearance.are_inside(enclosing, distances).any()
+
+
+def _pictures(facts: dict[str, Any]) -> str:
+    """Return how pictures get the look of a .blend. Nothing if it has none that they can have."""
+    try:
+        look = blend.look_of(facts)
+    except UserError:
+        return ""
+    if look == _PLAIN:
+        return ""
+    title = blender_looks.title(look)
+    return f"""
+# reprojections:
+#   pictures: {{look: file}}   # the views as PNG, as Blender shows the file: {title}
+"""
 
 
 def _exports(export: str | None, source: str) -> str:

@@ -54,33 +54,23 @@ def inventory(
     Objects and triangles are counted at the ``rendered_frames``. If files are missing or cannot be
     read, ``refuse`` gets them before Blender evaluates the scene with them.
     """
-    scene = bpy.context.scene
-    hidden = pruning.removable_objects()
     # Objects of other scenes may move the objects of this scene.
     changing = {
         "animated": sorted({str(owner.name_full) for owner, _ in animation.animated()}),
         "simulated": animation.simulated(),
         "uses_visibility": animation.uses_visibility(),
     }
-    shown = {scene, *pruning.background_scenes(scene)}
-    others = [other for other in bpy.data.scenes if other not in shown]
-    for other in others:
-        bpy.data.scenes.remove(other)
-    if others:
-        pruning.remove_unused()
-    pruning.remove_objects(hidden)
+    hidden = _remove_hidden()
     modifiers.refuse_too_many_faces()
-    objects = list(bpy.data.objects)
-    layer = bpy.context.view_layer
-    worlds = {world for world in (scene.world, layer.world_override) if world}
-    materials = rendered_materials()
-    lights = {obj.data for obj in objects if obj.type == "LIGHT"}
-    missing = problems([*materials, *worlds, *lights], rendered_frames)
+    shaders = _shaders()
+    missing = problems(shaders, rendered_frames)
     if missing and refuse:
         refuse(missing)
+    objects = list(bpy.data.objects)
+    lights = {shader for shader in shaders if isinstance(shader, bpy.types.Light)}
     features: dict[str, set[str]] = {name: set() for name in FEATURES}
     images = set()
-    for shader in (*materials, *worlds, *lights):
+    for shader in shaders:
         for feature, image in surface_features(shader):
             # A light always emits, so its nodes' features do not count.
             if feature and shader not in lights:
@@ -105,6 +95,33 @@ def inventory(
         "external_files": external_files(),
         "missing": missing,
     }
+
+
+def missing_files(rendered_frames: Sequence[float]) -> list[Missing]:
+    """Return the files that the open scene's render lacks. Removes all else from the open file."""
+    _remove_hidden()
+    return problems(_shaders(), rendered_frames)
+
+
+def _remove_hidden() -> list[str]:
+    """Remove the other scenes and all hidden objects. Return the names of these objects."""
+    scene = bpy.context.scene
+    hidden = pruning.removable_objects()
+    shown = {scene, *pruning.background_scenes(scene)}
+    others = [other for other in bpy.data.scenes if other not in shown]
+    for other in others:
+        bpy.data.scenes.remove(other)
+    if others:
+        pruning.remove_unused()
+    pruning.remove_objects(hidden)
+    return hidden
+
+
+def _shaders() -> list[Any]:
+    """Return the materials, worlds and lights of the open scene's objects."""
+    worlds = {bpy.context.scene.world, bpy.context.view_layer.world_override} - {None}
+    lights = {obj.data for obj in bpy.data.objects if obj.type == "LIGHT"}
+    return [*rendered_materials(), *worlds, *lights]
 
 
 def _fullest(rendered_frames: Sequence[float]) -> dict[str, Any]:

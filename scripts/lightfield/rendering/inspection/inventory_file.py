@@ -170,14 +170,18 @@ def _refuse_fluids(path: Path) -> None:
 
 
 def _refuse_missing(path: Path, problems: Sequence[external_files.Missing]) -> None:
-    """Raise `UserError`: files of a .blend are missing or cannot be read. Say what to do."""
+    raise UserError(missing_text(path, problems))
+
+
+def missing_text(path: Path, problems: Sequence[external_files.Missing]) -> str:
+    """Return which files of a .blend are missing or cannot be read, and what to do."""
     descriptions = []
     for entry in problems[:8]:
         file = Path(os.path.normpath(path.parent / entry["path"]))
         place = f"{file} ({entry['problem']}){case_hint(file)}"
         descriptions.append(f"the {entry['kind']} {entry['name']} at {place}")
     more = " …" if len(problems) > 8 else ""
-    raise UserError(
+    return (
         f"{len(problems)} of the files that it shows are missing or cannot be read: "
         f"{'; '.join(descriptions)}{more}; mend them, pack them into the "
         ".blend (in Blender: File, External Data), or render without them: scene: "
