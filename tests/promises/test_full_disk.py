@@ -52,7 +52,7 @@ def write_plot(path, seed):
 
 
 def write_page(path, seed):
-    keys = ("rig", "link", "resolution", "lens", "projection", "state", "picture")
+    keys = ("rig", "link", "frames", "resolution", "lens", "projection", "state", "picture")
     datasets = [dict.fromkeys(keys) | {"scene": "a", "views": seed}]
     page.write(path, "index.html.j2", datasets=datasets, families=[])
 
