@@ -80,7 +80,6 @@ def collect(
         "torn": synthesis.TORN_WEIGHT,
         "unmoved": synthesis.UNMOVED_WEIGHT,
         "sharpened": synthesis.SHARPENED,
-        "mostSharpened": synthesis.MOST_SHARPENED,
         "dark": float(kernels.DARK),
         "even": float(kernels.EVEN),
         "same": float(kernels.SAME),

@@ -70,7 +70,7 @@ class ReportHtml(Stage[PageSettings]):
 
     name = "report_html"
     function = "lightfield.report.dataset_page:write"
-    version = 4
+    version = 3
 
     dataset: Path = reads("folder of the dataset")
     dataset_name: str = option("name of the dataset, scene/rig", flag="--name", metavar="NAME")

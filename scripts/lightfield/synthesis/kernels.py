@@ -490,33 +490,28 @@ def draw_splats(
 
 
 @kernel
-def sharpen(
-    root: Array, inverse: Array, amount: np.float32, most: np.float32, sharp: Array
-) -> None:
+def sharpen(root: Array, right: Array, down: Array, amount: np.float32, sharp: Array) -> None:
     """Write the sharpened colours of ``root`` (h, w, 3) into ``sharp``.
 
-    Subtracts ``amount`` / 4 of each neighbour's difference. A root changes by at most ``most`` of
-    itself. Neighbours on other surfaces count, too: a pixel beside a tear mixes colours, and this
-    takes a part of the other surface's colour out. Neighbours without a ray, where ``inverse``
-    (h, w) is NaN, do not count.
+    Subtracts ``amount`` / 4 of each neighbour's difference. Only neighbours on one surface count,
+    as `link` marks them.
     """
-    height, width = inverse.shape
+    height, width = right.shape
     part = amount / np.float32(4)
     for i in range(height):
         for j in range(width):
             for c in range(3):
                 here = root[i, j, c]
                 difference = np.float32(0)
-                if j + 1 < width and inverse[i, j + 1] >= 0:
+                if right[i, j]:
                     difference += root[i, j + 1, c] - here
-                if j > 0 and inverse[i, j - 1] >= 0:
+                if j > 0 and right[i, j - 1]:
                     difference += root[i, j - 1, c] - here
-                if i + 1 < height and inverse[i + 1, j] >= 0:
+                if down[i, j]:
                     difference += root[i + 1, j, c] - here
-                if i > 0 and inverse[i - 1, j] >= 0:
+                if i > 0 and down[i - 1, j]:
                     difference += root[i - 1, j, c] - here
-                limit = most * here
-                sharp[i, j, c] = here - min(max(part * difference, -limit), limit)
+                sharp[i, j, c] = max(here - part * difference, np.float32(0))
 
 
 @kernel

@@ -2,7 +2,6 @@
 
 import { DATA } from "../page/data.js";
 import { LIGHT, depthCode } from "../page/packing.js";
-import { clamp } from "../page/vectors.js";
 import { coarseShapes } from "./coarse.js";
 import { joins, vertexOf } from "./joins.js";
 import { WALK, walk } from "./state.js";
@@ -94,30 +93,29 @@ function pixelTriangles(pixels) {
 
 // Return the roots of a picture's colours, sharpened as by `sharpen` in synthesis/kernels.py. The fourth number is the
 // certainty of each pixel.
-function sharpRoots(light, inverses, torn) {
+function sharpRoots(light, { right, down }, torn) {
   const [width, height] = DATA.size;
   const roots = Float32Array.from(light, (code) => ROOTS[code]);
   const sharp = new Float32Array(roots.length);
   const part = WALK.sharpened / 4;
-  // This is false outside the lens, where the inverse is NaN, and above and below the picture.
-  const hasRay = (pixel) => inverses[pixel] >= 0;
   for (let pixel = 0; pixel < width * height; pixel++) {
-    const [column, row] = [pixel % width, 4 * width];
-    const toRight = column + 1 < width && hasRay(pixel + 1);
-    const toLeft = column > 0 && hasRay(pixel - 1);
-    const [below, above] = [hasRay(pixel + width), hasRay(pixel - width)];
+    const [j, row] = [pixel % width, 4 * width];
+    const [joinsLeft, joinsAbove] = [j > 0 && right[pixel - 1], pixel >= width && down[pixel - width]];
     for (let at = 4 * pixel; at < 4 * pixel + 3; at++) {
       let difference = 0;
-      if (toRight) difference += roots[at + 4] - roots[at];
-      if (toLeft) difference += roots[at - 4] - roots[at];
-      if (below) difference += roots[at + row] - roots[at];
-      if (above) difference += roots[at - row] - roots[at];
-      const most = WALK.mostSharpened * roots[at];
-      sharp[at] = roots[at] - clamp(part * difference, -most, most);
+      if (right[pixel]) difference += roots[at + 4] - roots[at];
+      if (joinsLeft) difference += roots[at - 4] - roots[at];
+      if (down[pixel]) difference += roots[at + row] - roots[at];
+      if (joinsAbove) difference += roots[at - row] - roots[at];
+      sharp[at] = Math.max(roots[at] - part * difference, 0);
     }
     sharp[4 * pixel + 3] = walk.toRim[pixel] / 255;
   }
-  for (const pixel of torn) sharp[4 * pixel + 3] *= WALK.torn;
+  // The mixed colours beside a tear stay as they are.
+  for (const pixel of torn) {
+    for (let at = 4 * pixel; at < 4 * pixel + 3; at++) sharp[at] = roots[at];
+    sharp[4 * pixel + 3] *= WALK.torn;
+  }
   return sharp;
 }
 
@@ -140,7 +138,7 @@ export function upload(source, light, depth) {
   const shapes = (corners) => drawable(gl, gl.TRIANGLES, corners);
   const image = (format, layout, values) =>
     texture(gl, gl.TEXTURE_2D, format, ...DATA.size, 0, layout, gl.FLOAT, values);
-  const roots = image(gl.RGBA16F, gl.RGBA, sharpRoots(light, inverses, torn));
+  const roots = image(gl.RGBA16F, gl.RGBA, sharpRoots(light, joined, torn));
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
   Object.assign(source, {
