@@ -16,7 +16,7 @@ from checkouts import ROOT, SEQUENCE, checkout, snakemake, with_consumers
 from sphere import write_views
 
 pytestmark = pytest.mark.slow
-# A scene that needs more than the smoke scene does: a download, a calibration, and free places.
+# A scene that needs more than the smoke scene does, such as a download, free places, and a video.
 BROUGHT = """
 scene:
   blend: scene.blend
@@ -34,6 +34,7 @@ rigs:
     size: 1
     camera: {lens: equidistant, fov: 180, resolution: [16, 16]}
 flow: {pairs: neighbours}
+video: {path: walk, format: webp}
 exports:
   instant_ngp: {sources: [views]}
   nerfstudio: {sources: [views], depth: true}
