@@ -20,15 +20,5 @@ Phase = Literal[
     "benchmark",
     "synthesis",
 ]
-CHANGE_DATASETS: tuple[Phase, ...] = (
-    "cameras",
-    "views",
-    "flow",
-    "reprojections",
-    "sensor",
-    "exports",
-    "validation",
-)
-"""The phases whose jobs change what a dataset's sha256sums.txt lists."""
 # The phase of the jobs that develop views as a sensor sees them.
 SENSOR_PHASE: Phase = "sensor"

@@ -100,8 +100,6 @@ class Handlers:
             self._checks.check(self.display.slurm_run is not None)
             plan.write_new_settings()
             self._checks.remove_leftovers()
-            if not plan.is_stored:
-                plan.withdraw_checksums()
             self._begin_display()
             announce_stop()
             self._watch_slurm()

@@ -26,8 +26,6 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, set_aside, special_kind, unreadable, write_text
 from lightfield.engine import receipts
 from lightfield.engine.receipts import SUFFIX, make_way
-from lightfield.formats.layout import SUMS
-from lightfield.planning.phases import CHANGE_DATASETS
 from lightfield.stages.registry import VERSIONS
 from lightfield.workflow import presence, run_lock
 from lightfield.workflow.build import Wildcards
@@ -334,19 +332,6 @@ class JobPlan:
         special = [Path(path) for path in made if special_kind(path)]
         for path in locks + times + special:
             make_way(path, Path(self.run.work))
-
-    def withdraw_checksums(self) -> None:
-        """Remove the sha256sums.txt of each dataset whose files this run changes.
-
-        Only a valid dataset has this file. If the run stops half way, or ends before validation,
-        the dataset is not valid.
-        """
-        for planned in self.planned_jobs():
-            if planned.job.phase in CHANGE_DATASETS and "rig" in planned.names:
-                dataset = Path(self.run.results, planned.names["scene"], planned.names["rig"])
-                # A frame's files also belong to its sequence.
-                for folder in (dataset, dataset.parent):
-                    (folder / SUMS).unlink(missing_ok=True)
 
     # What a plan says of files that are made again.
 

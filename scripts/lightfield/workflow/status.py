@@ -21,7 +21,7 @@ from lightfield.core.names import RENDERED
 from lightfield.core.units import duration
 from lightfield.engine import receipts
 from lightfield.engine.receipts import FOLDER, Output
-from lightfield.formats.layout import IMAGES, SUMS, VALIDATION
+from lightfield.formats.layout import IMAGES, VALIDATION
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.stages.checks import Status
 from lightfield.workflow import history
@@ -187,7 +187,9 @@ def lines(
     for reprojection in reprojections:
         reprojected = _reprojected(shards / reprojection, folder / reprojection, rendering)
         parts.append(f"  {reprojection}: {reprojected} of {count}")
-    parts.append(f"  validated: {_validated(folder, count, rendering)}")
+    made = [path for each in reprojections for path in history.shards(shards / each)]
+    reprojected_ns = max((path.stat().st_mtime_ns for path in made), default=0)
+    parts.append(f"  validated: {_validated(folder, count, rendering, reprojected_ns)}")
     if rendering.outdated:
         views = units.count(rendering.outdated, "view")
         parts.append(f"  outdated: {views} of an earlier scene, or of earlier settings")
@@ -225,16 +227,19 @@ def _reprojected(shards: Path, folder: Path, rendering: RenderProgress) -> int:
     return count
 
 
-def _validated(folder: Path, count: int, rendering: RenderProgress) -> str:
-    """Return whether a dataset's current views were validated, and the result."""
+def _validated(folder: Path, count: int, rendering: RenderProgress, reprojected_ns: int) -> str:
+    """Return whether a dataset's current views were validated, and the result.
+
+    ``reprojected_ns`` is when the last shard of a reprojection was made.
+    """
     path = folder / VALIDATION
     if len(rendering.finished) < count or not path.exists():
         return "no"
     if path.stat().st_mtime_ns < max(rendering.finished.values()):
         return "not since its views were made"
+    if path.stat().st_mtime_ns < reprojected_ns:
+        return "not since its reprojections were made"
     problem = broken(path)
     if problem:
         return f"no: {path} {problem}, and is made anew"
-    if not read_json(path).get("valid"):
-        return f"yes, and it is not valid: see {path}"
-    return "yes" if (folder / SUMS).exists() else "not since its files changed"
+    return "yes" if read_json(path).get("valid") else f"yes, and it is not valid: see {path}"
