@@ -187,7 +187,7 @@ def lines(
     for reprojection in reprojections:
         reprojected = _reprojected(shards / reprojection, folder / reprojection, rendering)
         parts.append(f"  {reprojection}: {reprojected} of {count}")
-    made = [path for each in reprojections for path in history.shards(shards / each)]
+    made = [path for each in reprojections for path in (shards / each).glob(f"*{receipts.SUFFIX}")]
     reprojected_ns = max((path.stat().st_mtime_ns for path in made), default=0)
     parts.append(f"  validated: {_validated(folder, count, rendering, reprojected_ns)}")
     if rendering.outdated:
