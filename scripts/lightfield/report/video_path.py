@@ -39,8 +39,9 @@ class Standpoint:
     @property
     def ahead(self) -> Array:
         """The unit direction (3,) to the target."""
-        way: Array = self.target - self.at
-        return way / np.linalg.norm(way)
+        way = self.target - self.at
+        ahead: Array = way / np.linalg.norm(way)
+        return ahead
 
     @property
     def is_steep(self) -> bool:
