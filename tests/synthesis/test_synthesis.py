@@ -267,6 +267,17 @@ def test_a_view_at_a_cameras_place_equals_the_cameras_view(times):
     np.testing.assert_allclose(made.distance[amid], distance[amid], rtol=1e-4)
 
 
+def test_the_mixed_colours_beside_a_tear_are_not_sharpened():
+    field = sources(look_at_ball)
+    surface = field.surface(3)
+    colour, _ = look_at_ball(field.lens, field.world_from_cameras[3])
+    roots = np.sqrt(np.nan_to_num(colour))
+    np.testing.assert_allclose(surface.shade[surface.torn][:, :3], roots[surface.torn], atol=1e-6)
+    # All other colours are, a little, because they are smooth.
+    others = np.abs(surface.shade[..., :3] - roots)[~surface.torn & np.isfinite(surface.inverse)]
+    assert others.max() > 0.001
+
+
 def test_a_view_from_a_cameras_place_has_no_holes():
     field = sources(look_at_ball)
     made = field.blended(field.world_from_cameras[3], field.lens, [3])
