@@ -36,7 +36,7 @@ from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import Rig
-from lightfield.geometry.rotations import euler_to_matrix
+from lightfield.geometry.rotations import euler_to_matrix, nearest_to_axes
 from lightfield.imaging import images
 from lightfield.settings.base import Vector, as_list, checked
 
@@ -452,11 +452,9 @@ def looked_at(cameras: Floats, axes: Floats) -> Floats | None:
     It is the point nearest to all optical axes by least squares. It must lie in front of every
     camera, and no farther from the rig's middle than the farthest camera.
     """
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    normal = across.sum(axis=0)
-    if np.linalg.matrix_rank(normal, tol=1e-6 * len(cameras)) < 3:
-        return None  # parallel
-    point: Floats = np.linalg.solve(normal, (across @ cameras[:, :, None]).sum(axis=0))[:, 0]
+    point = nearest_to_axes(cameras, axes)
+    if point is None:
+        return None
     in_front = ((point - cameras) * axes).sum(axis=1) > 0
     middle = (cameras.min(axis=0) + cameras.max(axis=0)) / 2
     reach = np.max(np.linalg.norm(cameras - middle, axis=1))

@@ -1,5 +1,7 @@
 """Rotations as Blender writes them: matrices, and XYZ Euler angles in radians."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -77,11 +79,12 @@ def quaternion_to_matrix(quaternion: Floats) -> Floats:
     return matrix
 
 
-def looking_at(positions: Floats, target: Floats) -> Floats:
+def looking_at(positions: Floats, target: Floats, up: Sequence[float] = (0.0, 0.0, 1.0)) -> Floats:
     """Return the rotations (n, 3, 3) of cameras at ``positions`` (n, 3) that look at a point (3,).
 
-    +Y is as near to the world's +Z as possible. A camera straight above or below the point has its
-    +X along the world's +X. Raises `UserError` for a camera at the point itself.
+    +Y is as near to ``up`` as possible, an axis of the world. A camera straight above or below the
+    point has its +X along the world's +X, if +Z is up. Raises `UserError` for a camera at the point
+    itself.
     """
     back = positions - target
     length = np.linalg.norm(back, axis=-1, keepdims=True)
@@ -90,9 +93,24 @@ def looking_at(positions: Floats, target: Floats) -> Floats:
             f"look_at: a camera is at {target.tolist()} itself, so it cannot look at that point"
         )
     back = back / length
-    right = np.cross([0.0, 0.0, 1.0], back)
+    right = np.cross(up, back)
     upright = np.linalg.norm(right, axis=-1) <= 1e-4
-    right[upright] = np.cross([0.0, 1.0, 0.0], back[upright]) * np.sign(back[upright, 2:])
+    sides = np.sign(back[upright] @ np.array(up))[:, np.newaxis]
+    right[upright] = np.cross(np.roll(up, -1), back[upright]) * sides
     right /= np.linalg.norm(right, axis=-1, keepdims=True)
     matrices: Floats = np.stack([right, np.cross(back, right), back], axis=-1)
     return matrices
+
+
+def nearest_to_axes(positions: Floats, axes: Floats) -> Floats | None:
+    """Return the point (3,) nearest to the optical axes of cameras, by least squares.
+
+    ``axes`` (n, 3) are the unit directions in which the cameras at ``positions`` (n, 3) look. None
+    if the axes are parallel.
+    """
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    normal = across.sum(axis=0)
+    if np.linalg.matrix_rank(normal, tol=1e-6 * len(positions)) < 3:
+        return None
+    point: Floats = np.linalg.solve(normal, (across @ positions[:, :, None]).sum(axis=0))[:, 0]
+    return point

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from lightfield.geometry.rotations import looking_at, nearest_to_axes
+
 Array = NDArray[Any]
 
 # Cameras look inward if the mean cosine between their directions and the way to their middle is
@@ -54,12 +56,9 @@ class Standpoint:
 
     def poses(self, places: Array) -> Array:
         """Return the poses (n, 4, 4) of eyes at ``places`` (n, 3) that look at the target."""
-        ahead = self.target - places
-        ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-        right = np.cross(ahead, self.up)
-        right /= np.linalg.norm(right, axis=1, keepdims=True)
         poses = np.tile(np.eye(4), (len(places), 1, 1))
-        poses[:, :3] = np.stack([right, np.cross(right, ahead), -ahead, places], axis=-1)
+        poses[:, :3, :3] = looking_at(places, self.target, self.up.tolist())
+        poses[:, :3, 3] = places
         return poses
 
 
@@ -72,10 +71,7 @@ def common_target(world_from_cameras: Array) -> Array | None:
     cosines = (inward * ahead).sum(axis=1) / np.maximum(lengths, 1e-9)
     if cosines.mean() < _INWARD:
         return None
-    across = np.eye(3) - ahead[:, :, None] * ahead[:, None, :]
-    sides = np.einsum("nij,nj->i", across, places)
-    target: Array = np.linalg.lstsq(across.sum(axis=0), sides, rcond=None)[0]
-    return target
+    return nearest_to_axes(places, ahead)
 
 
 def turntable(standpoint: Standpoint, places: Array, planes: Array, count: int) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.rotations import looking_at
 from lightfield.geometry.visibility import pixel_indices
 from lightfield.synthesis import view as synthesis
 
@@ -129,8 +130,7 @@ def _seen_part(pose: Array, lens: Lens, world_from_cameras: Array, distances: Ar
 
 def eye(at: Array, ahead: Array) -> Array:
     """Return the pose (4, 4) of an upright eye at a place that looks ahead."""
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right = _unit(right) if np.linalg.norm(right) > 1e-6 else np.array([1.0, 0.0, 0.0])
     pose = np.eye(4)
-    pose[:3, :4] = np.column_stack([right, np.cross(right, ahead), -ahead, at])
+    pose[:3, :3] = looking_at(-ahead[np.newaxis], np.zeros(3))[0]
+    pose[:3, 3] = at
     return pose
