@@ -15,11 +15,11 @@ from test_sequence_exports import CAMERAS, FRAMES, source_of, write_moving_ball
 from lightfield.core.files import sha256
 from lightfield.export.sequence import SourceSequence
 from lightfield.exporters import EXPORTERS
+from lightfield.formats.layout import frame_folders
 from lightfield.imaging import images
 from lightfield.products import exports
 from lightfield.validation.sequence import (
     export_lists,
-    frame_folders,
     remove_strays,
     validate_sequence,
 )

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from lightfield.core.errors import UserError
-from lightfield.formats.layout import ImageSet
+from lightfield.formats.layout import ImageSet, frame_folders
 from lightfield.formats.lightfield import View
 from lightfield.formats.passes import PASSES
 from lightfield.geometry.flow import shorter
 from lightfield.imaging import images
 from lightfield.validation.cameras import camera_of
 from lightfield.validation.files import read_sets
-from lightfield.validation.sequence import export_lists, frame_folders
+from lightfield.validation.sequence import export_lists
 from oracles import exported_cameras, exported_depth
 from oracles.exported_cameras import Expected, SetExport
 from oracles.exported_depth import converted

@@ -131,6 +131,11 @@ def further_parts(package: Path) -> list[Path]:
     return sorted(tar for tar in tars if re.fullmatch(r"\.\d+", tar.stem[len(package.stem) :]))
 
 
+def frame_folders(rig: Path) -> list[str]:
+    """Return the folders of a sequence's frames in a rig's folder, in the order of time."""
+    return sorted(path.parent.name for path in rig.glob(f"{FRAME_FOLDERS}/{NAME}"))
+
+
 def frame_number(folder: str) -> int:
     """Return the frame of the animation whose folder in a sequence has this name: f00001."""
     return int(folder.removeprefix("f"))

@@ -11,11 +11,10 @@ from lightfield.core.files import read_json, reading
 from lightfield.core.names import CORPUS, SEQUENCE_PAGE
 from lightfield.core.paths import files_below, inside
 from lightfield.engine import receipts
-from lightfield.formats.layout import REPORT, VALIDATION
+from lightfield.formats.layout import REPORT, VALIDATION, frame_folders
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.report import page, tables
 from lightfield.stages.report import ReportIndex
-from lightfield.validation.sequence import frame_folders
 
 THUMBNAIL = 480
 _PAGE = (REPORT, "index.html")

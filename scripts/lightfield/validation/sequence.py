@@ -10,7 +10,7 @@ from pathlib import Path
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, sha256
 from lightfield.formats.export_lists import IN_FOLDERS, MANIFEST
-from lightfield.formats.layout import FRAME_FOLDERS, REPORT
+from lightfield.formats.layout import REPORT, frame_folders
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
@@ -25,11 +25,6 @@ from lightfield.validation.files import (
 from lightfield.validation.result import Check, Result
 
 LISTS = (f"exports/*/{MANIFEST}", f"*/exports/*/{MANIFEST}")
-
-
-def frame_folders(rig: Path) -> list[str]:
-    """Return the folders of a sequence's frames in a rig's folder, in the order of time."""
-    return sorted(path.parent.name for path in rig.glob(f"{FRAME_FOLDERS}/{NAME}"))
 
 
 def export_lists(rig: Path) -> list[Path]:

@@ -12,7 +12,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import sha256, write_json
 from lightfield.core.paths import place_in
 from lightfield.engine.receipts import made_in
-from lightfield.formats.layout import REPORT, SUMS, write_sums
+from lightfield.formats.layout import REPORT, SUMS, frame_folders, write_sums
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.checks import Validate, ValidateSequence
 from lightfield.validation import clipping, emptiness, pixels, sequence
@@ -67,7 +67,7 @@ def check(job: Validate) -> Result:
 def check_sequence(job: ValidateSequence) -> None:
     """Check the exports of a sequence. Raises `UserError` if they are not valid."""
     _check_paths(job, job.rig)
-    frames = job.settings.frames or sequence.frame_folders(job.rig)
+    frames = job.settings.frames or frame_folders(job.rig)
     lists = sequence.export_lists(job.rig)
     if job.settings.exports is not None:
         lists = [Path(path) for path in job.settings.exports]
