@@ -94,6 +94,11 @@ class Export(Settings, ABC):
         return self.joined_rigs or self.rigs
 
     @property
+    def rigs_key(self) -> str:
+        """The key of the scene YAML that has the chosen rigs."""
+        return "together" if self.joined_rigs else "rigs"
+
+    @property
     def joins_split(self) -> bool:
         """Whether an export of a rig that trains concerns the rigs that test, and vice versa."""
         return self.is_for_training or self.reads_training_list

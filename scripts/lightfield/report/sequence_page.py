@@ -7,7 +7,6 @@ not flicker.
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -122,11 +121,10 @@ def _facts(lightfields: Sequence[LightField], rig: Rig) -> list[tuple[str, str]]
     step = rig.sequence.step if rig.sequence else 1
     numbers = f"{first.frame} to {last.frame}" + (f", every {step}" if step > 1 else "")
     places = first.world_from_cameras[:, :3, 3]
-    facts: dict[str, Any] = {
-        "Frames": f"{len(lightfields)} ({numbers})",
-        "Views of a frame": str(len(first.views)),
-        "Rig": rig_text(rig, places),
-        "Lens": lens.description,
-        "Resolution": f"{lens.width} × {lens.height}",
-    }
-    return [*facts.items()]
+    return [
+        ("Frames", f"{len(lightfields)} ({numbers})"),
+        ("Views of a frame", str(len(first.views))),
+        ("Rig", rig_text(rig, places)),
+        ("Lens", lens.description),
+        ("Resolution", f"{lens.width} × {lens.height}"),
+    ]

@@ -18,7 +18,7 @@ def check(blocks: SceneBlocks) -> None:
 
 def _check_export(blocks: SceneBlocks, export_key: str, export: Export) -> None:
     """Check that an export's rigs and sources exist, and that its consumer can take them."""
-    rigs_key = f"{export_key}.{'together' if export.joined_rigs else 'rigs'}"
+    rigs_key = f"{export_key}.{export.rigs_key}"
     check_rigs(blocks, rigs_key, export.chosen_rigs or ())
     _check_joined_rigs(blocks, rigs_key, export.joined_rigs)
     key = f"{export_key}.sources"

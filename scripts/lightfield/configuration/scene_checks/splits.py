@@ -26,7 +26,7 @@ def check(blocks: SceneBlocks) -> None:
         _check_whole_split(blocks, f"{key}.rigs", split_rigs.keys(), reprojection.rigs)
     for name, export in blocks.exports.selected.items():
         if export.joins_split:
-            key = f"exports.{name}.{'together' if export.joined_rigs else 'rigs'}"
+            key = f"exports.{name}.{export.rigs_key}"
             _check_whole_split(blocks, key, split_rigs.keys(), export.chosen_rigs)
 
 
