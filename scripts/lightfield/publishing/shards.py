@@ -89,7 +89,7 @@ class InTar(Protocol):
         """The most bytes that it takes in a tar."""
 
 
-Packed = TypeVar("Packed", bound=InTar)
+OfTar = TypeVar("OfTar", bound=InTar)
 
 
 @dataclass(frozen=True)
@@ -245,17 +245,18 @@ def write_others(output: Path, name: str, datasets: Sequence[DatasetFiles]) -> P
     return path
 
 
-def parts(samples: Iterable[Packed], most: float) -> Iterator[list[Packed]]:
+def parts(samples: Iterable[OfTar], most: float) -> Iterator[list[OfTar]]:
     """Yield runs of samples whose tar has at most ``most`` bytes. A larger sample is alone."""
-    part: list[Packed] = []
+    part: list[OfTar] = []
     size = float(tarfile.RECORDSIZE)
     for sample in samples:
-        if part and size + sample.tar_bytes > most:
+        needed = sample.tar_bytes
+        if part and size + needed > most:
             yield part
             part = []
             size = tarfile.RECORDSIZE
         part.append(sample)
-        size += sample.tar_bytes
+        size += needed
     if part:
         yield part
 
