@@ -83,5 +83,5 @@ class CalibratedLens(Fisheye):
         return {
             "focal_length": numbers["FOCAL_LENGTH"],
             "coefficients": tuple(numbers[name.upper()] for name in cls.coefficient_names),
-            "fov": numbers.get("FOV", 2 * math.pi),
+            **({"fov": numbers["FOV"]} if "FOV" in numbers else {}),
         }
