@@ -29,16 +29,23 @@ from lightfield.geometry.lenses import (
     from_camera,
     from_lightfield,
 )
+from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
+from lightfield.geometry.lenses.division import Division
+from lightfield.geometry.lenses.double_sphere import DoubleSphere
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.equisolid import Equisolid
+from lightfield.geometry.lenses.extended_unified import ExtendedUnified
+from lightfield.geometry.lenses.f_theta import FTheta
+from lightfield.geometry.lenses.fov_model import FovModel
 from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.orthographic import Orthographic
 from lightfield.geometry.lenses.polynomial import Polynomial
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.lenses.stereographic import Stereographic
+from lightfield.geometry.lenses.unified import Unified
 
 BLENDER_POLYNOMIAL = (-1.17e-05, -0.0199887, -3.3525e-06, 3.09927e-06, -2.60646e-08)
 OPENCV = (-0.01, 0.03, -0.02, 0.003)
@@ -68,6 +75,24 @@ EXAMPLES: dict[str, Lens] = {
     "kannala_brandt shifted": KannalaBrandt(
         **SHIFTED, focal_length=11, coefficients=(0, 0, 0, 0), fov=math.radians(300)
     ),
+    "division": Division(**SIZE, focal_length=11, coefficients=(-0.35,)),
+    "division k > 0": Division(**SHIFTED, focal_length=30, coefficients=(0.2,)),
+    "division k = 0": Division(**SIZE, focal_length=18, coefficients=(0.0,)),
+    "fov_model": FovModel(**SIZE, focal_length=14, coefficients=(0.93,)),
+    "fov_model shifted": FovModel(**SHIFTED, focal_length=14, coefficients=(1e-6,)),
+    "unified": Unified(**SIZE, focal_length=20, coefficients=(0.9,)),
+    "unified xi > 1": Unified(**SHIFTED, focal_length=40, coefficients=(1.6,)),
+    "unified xi = 1": Unified(**SIZE, focal_length=12, coefficients=(1.0,), fov=5.5),
+    "extended_unified": ExtendedUnified(**SIZE, focal_length=9, coefficients=(0.628, 1.023)),
+    "extended_unified alpha < 0.5": ExtendedUnified(
+        **SHIFTED, focal_length=14, coefficients=(0.3, 4.0)
+    ),
+    "double_sphere": DoubleSphere(**SIZE, focal_length=9, coefficients=(-0.172, 0.593)),
+    "double_sphere alpha < 0.5": DoubleSphere(
+        **SHIFTED, focal_length=14, coefficients=(0.4, 0.3), fov=3.3
+    ),
+    "f_theta": FTheta(**SIZE, focal_length=11, coefficients=(0.01, -0.02, 0.003, -0.001)),
+    "f_theta shifted": FTheta(**SHIFTED, focal_length=11, coefficients=(0, 0.1, 0, 0), fov=3),
     "equirectangular": Equirectangular(**SIZE),
     "equirectangular part": Equirectangular(**SIZE, longitude=(-1, 2.5), latitude=(-0.5, 1.2)),
     "equirectangular part ahead": Equirectangular(**SIZE, longitude=(-1.2, 1.2)),

@@ -29,6 +29,11 @@ for _module in pkgutil.iter_modules(__path__):
 OTHER_NAMES.update(
     dict.fromkeys(("perspective", "persp", "pinhole"), "rectilinear")
     | {"fisheye": "equidistant", "opencv_fisheye": "kannala_brandt"}
+    | dict.fromkeys(("ucm", "mei", "omni", "omnidir"), "unified")
+    | dict.fromkeys(("simple_division",), "division")
+    | {"eucm": "extended_unified", "ds": "double_sphere", "ftheta": "f_theta"}
+    | dict.fromkeys(("atan", "fov"), "fov_model")
+    | dict.fromkeys(("radtan", "opencv", "full_opencv"), "brown_conrady")
     | dict.fromkeys(("panorama", "panoramic", "spherical", "latlong"), "equirectangular")
 )
 
