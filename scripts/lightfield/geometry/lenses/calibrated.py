@@ -87,21 +87,16 @@ class CalibratedLens(Fisheye):
 
     @property
     def clipped(self) -> str | None:
-        """What the end of the lens's equation cuts off the image, for people.
-
-        None if `fov` ends the lens before, and if every pixel has a ray.
-        """
         if self._end > self.fov / 2 - ANGLE_SLACK:
             return None
         rays = self.fitted(_COUNTED_SIDE).pixel_rays(np.float32)
         blank = float(np.isnan(rays[..., 0]).mean())
         if blank == 0:
             return None
-        end = math.degrees(self._end)
         return (
-            f"the {self.title} ends at {end:.4g}°, {self._limit:.4g} focal lengths from its "
-            f"principal point, so {100 * blank:.2g} % of the image has no ray; choose the limit "
-            f"by fov, at most {2 * end:.4g}"
+            f"the {self.title} ends at {math.degrees(self._end):.4g}°, {self._limit:.4g} focal "
+            f"lengths from its principal point, so {100 * blank:.2g} % of the image has no ray; "
+            "choose a smaller limit by fov"
         )
 
     def _to_camera(self) -> dict[str, Any]:
