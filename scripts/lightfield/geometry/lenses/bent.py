@@ -88,7 +88,7 @@ class BentLens(CalibratedLens):
         """The lens's r over the radius t in the plane of the bend."""
 
     @cached_property
-    def _end(self) -> float:
+    def _largest_t(self) -> float:
         """The largest t of the lens."""
         end = self._plane.end
         if not self._bend:
@@ -108,9 +108,14 @@ class BentLens(CalibratedLens):
         radial = np.minimum(self._plane.slope(t), self._plane.value(t) / t)
         return np.asarray(radial - self._bend.steepest(t))
 
+    @property
+    def _end(self) -> float:
+        sin, cos = self._sin_cos(np.asarray(self._limit))
+        return float(np.arctan2(sin, cos))
+
     @cached_property
     def _limit(self) -> float:
-        return float(self._plane.value(self._end))
+        return float(self._plane.value(self._largest_t))
 
     @property
     def mirrors(self) -> tuple[bool, bool]:
@@ -174,8 +179,8 @@ class BentLens(CalibratedLens):
         bend stays as it is at the end, so that all goals have a place.
         """
         t = np.hypot(*places)
-        inner = np.minimum(t, self._end)
-        slope = np.where(t > self._end, 1, self._plane.slope(inner))
+        inner = np.minimum(t, self._largest_t)
+        slope = np.where(t > self._largest_t, 1, self._plane.slope(inner))
         r = self._plane.value(inner) + (t - inner)
         ratio = _quotient(r, t, 1.0)
         radial = places * ratio
@@ -183,7 +188,7 @@ class BentLens(CalibratedLens):
         offsets = goals - radial - self._bend.moves(*kept)
         (uu, uv), (vu, vv) = self._bend.jacobian(*kept)
         across, upwards = places * _quotient(np.ones_like(t), t, 0.0)
-        beyond = np.flatnonzero(t > self._end)
+        beyond = np.flatnonzero(t > self._largest_t)
         # There, the bend changes with the direction alone.
         for by_u, by_v in ((uu, uv), (vu, vv)) if beyond.size else ():
             along = (by_u * across + by_v * upwards)[beyond]

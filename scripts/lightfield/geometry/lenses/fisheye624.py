@@ -7,8 +7,11 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from lightfield.geometry.lenses.bent import Bend, BentLens
-from lightfield.geometry.lenses.calibrated import CalibratedSettings
-from lightfield.geometry.lenses.calibrated_fisheye import CalibratedFisheye
+from lightfield.geometry.lenses.calibrated import (
+    CalibratedSettings,
+    PolynomialOfAngle,
+    odd_polynomial,
+)
 from lightfield.geometry.lenses.increasing_polynomial import Increasing, IncreasingPolynomial
 from lightfield.settings.base import as_list
 
@@ -27,7 +30,7 @@ class Fisheye624Settings(CalibratedSettings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fisheye624(BentLens, CalibratedFisheye):
+class Fisheye624(BentLens, PolynomialOfAngle):
     """r = f (θ + k0 θ³ + k1 θ⁵ + … + k5 θ¹³), bent by p0, p1 and s0 to s3 in the plane of r.
 
     ``coefficients`` are k0 to k5, p0, p1 and s0 to s3. Source: Project Aria's
@@ -45,8 +48,8 @@ class Fisheye624(BentLens, CalibratedFisheye):
     Settings = Fisheye624Settings
 
     @property
-    def _terms(self) -> tuple[float, ...]:
-        return self.coefficients[:6]
+    def _terms(self) -> list[float]:
+        return odd_polynomial(self.coefficients[:6])
 
     @cached_property
     def _bend(self) -> Bend:

@@ -5,8 +5,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from lightfield.geometry.lenses.calibrated import CalibratedSettings
-from lightfield.geometry.lenses.calibrated_fisheye import CalibratedFisheye
+from lightfield.geometry.lenses.calibrated import (
+    CalibratedSettings,
+    PolynomialOfAngle,
+    odd_polynomial,
+)
 from lightfield.settings.base import as_list
 
 
@@ -21,7 +24,7 @@ class KannalaBrandtSettings(CalibratedSettings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class KannalaBrandt(CalibratedFisheye):
+class KannalaBrandt(PolynomialOfAngle):
     """r = f (θ + k1 θ³ + k2 θ⁵ + k3 θ⁷ + k4 θ⁹), ``focal_length`` in mm, out to ``fov`` / 2.
 
     The lens ends where r stops growing with θ. Source: Kannala and Brandt 2006, equation 6, as
@@ -35,5 +38,5 @@ class KannalaBrandt(CalibratedFisheye):
     Settings = KannalaBrandtSettings
 
     @property
-    def _terms(self) -> tuple[float, ...]:
-        return self.coefficients
+    def _terms(self) -> list[float]:
+        return odd_polynomial(self.coefficients)

@@ -7,8 +7,11 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from lightfield.geometry.lenses.bent import Bend, BentLens
-from lightfield.geometry.lenses.calibrated import CalibratedSettings
-from lightfield.geometry.lenses.calibrated_fisheye import CalibratedFisheye
+from lightfield.geometry.lenses.calibrated import (
+    CalibratedSettings,
+    PolynomialOfAngle,
+    odd_polynomial,
+)
 from lightfield.geometry.lenses.increasing_polynomial import Increasing
 from lightfield.settings.base import as_list
 
@@ -26,7 +29,7 @@ class ThinPrismFisheyeSettings(CalibratedSettings):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ThinPrismFisheye(BentLens, CalibratedFisheye):
+class ThinPrismFisheye(BentLens, PolynomialOfAngle):
     """r = f (θ + k1 θ³ + k2 θ⁵ + k3 θ⁷ + k4 θ⁹), bent by p1, p2, sx1 and sy1 in the plane of θ.
 
     ``coefficients`` are k1, k2, p1, p2, k3, k4, sx1 and sy1. Source: COLMAP's THIN_PRISM_FISHEYE,
@@ -40,9 +43,9 @@ class ThinPrismFisheye(BentLens, CalibratedFisheye):
     Settings = ThinPrismFisheyeSettings
 
     @property
-    def _terms(self) -> tuple[float, ...]:
+    def _terms(self) -> list[float]:
         k1, k2, _, _, k3, k4, *_ = self.coefficients
-        return k1, k2, k3, k4
+        return odd_polynomial((k1, k2, k3, k4))
 
     @cached_property
     def _bend(self) -> Bend:
