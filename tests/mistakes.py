@@ -851,8 +851,8 @@ EXPLAINED = [
     ),
     (
         "rigs.LFSphere.camera",
-        {"lens": "stereographic", "fov": 180, "resolution": [9, 9]},
-        "rigs.LFSphere.camera.lens: is 'stereographic', which Cycles does not have",
+        {"lens": "stereographic", "fov": 359, "resolution": [2048, 2048]},
+        "rigs.LFSphere.camera: stereographic fisheye, 359° would be rendered with an error of 0.6",
     ),
     ("render.depth", "z", "render.depth: is 'z', but rigs.LFCuboid.camera"),
     (
