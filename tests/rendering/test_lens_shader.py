@@ -1,6 +1,7 @@
 """Lenses that Cycles lacks, rendered by a shader: against Cycles' own lenses, and their rays."""
 
 import importlib
+import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import simulated_gpus
+from checkouts import checkout, snakemake
 from scipy.ndimage import binary_dilation
 
 from lightfield.core.errors import UserError
@@ -92,6 +94,14 @@ def scene(tmp_path_factory):
     for frame, place in enumerate([(-0.03, 0.01, 0), (0, 0, 0), (0.02, 0, 0.01)]):
         room.location = place
         room.keyframe_insert("location", frame=frame)
+    backdrop = bpy.data.materials.new("backdrop")
+    backdrop.use_nodes = True
+    links = backdrop.node_tree.links
+    window = backdrop.node_tree.nodes.new("ShaderNodeTexCoord").outputs["Window"]
+    links.new(window, backdrop.node_tree.nodes["Principled BSDF"].inputs["Base Color"])
+    # Behind the wall.
+    bpy.ops.mesh.primitive_plane_add(size=0.1, location=(0, 0, 3))
+    bpy.context.object.data.materials.append(backdrop)
     camera = bpy.data.cameras.new("artist")
     camera.lens = 24
     camera.dof.use_dof = True
@@ -276,6 +286,53 @@ def test_only_optix_and_processors_render_a_lens_that_cycles_lacks(render, monke
     assert message.startswith("device: ") and "\n" not in message
     for word in ("cuda", "stereographic", "optix", "cpu", "equidistant", "reproject"):
         assert word in message
+
+
+@pytest.mark.parametrize("name", ["equidistant", "stereographic"])
+def test_a_material_that_reads_the_window_is_named(name, scene, run_program, tmp_path):
+    lens = lenses.from_camera({"resolution": [SIZE, SIZE], **(BOTH | LACKING)[name]})
+    LightField.from_rig(RIG, lens, frame=1, scene={}).write(tmp_path / "lightfield.json")
+    arguments = ("--blend", scene, "--lightfield", tmp_path / "lightfield.json")
+    result = run_program("check_cameras.py", *arguments, "--output", tmp_path / "cameras.json")
+    warned = [line for line in result.stderr.splitlines() if "Window" in line]
+    if name == "equidistant":
+        assert not warned
+    else:
+        (line,) = warned
+        assert line.startswith("warning: backdrop: ") and "stereographic" in line
+
+
+DATASET = """
+licence: CC0-1.0
+scene: {builder: room}
+render: {samples: 4, passes: [normal, motion]}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 2]
+    size: 0.5
+    center: [0, 0, 1.2]
+    camera:
+      {lens: stereographic, fov: 200, resolution: [48, 48], principal_point: [25.5, 22.25]}
+reprojections:
+  perspective:
+    camera: {lens: rectilinear, fov: 80, resolution: [32, 32]}
+    format: exr
+report: {panorama: false}
+"""
+
+
+def test_a_dataset_through_a_lens_that_cycles_lacks_is_built_and_valid(tmp_path):
+    folder = checkout(tmp_path / "plenoforge", lens=DATASET)
+    target = "results/lens/LFPlane/validation.json"
+    chosen = ("--config", "scenes=[lens]", "rigs=all", "preset=full")
+    result = snakemake(folder, "--cores", "2", target, *chosen)
+    assert result.returncode == 0, result.stdout + result.stderr
+    validation = json.loads((folder / target).read_text())
+    assert validation["valid"], validation
+    (geometry,) = (check for check in validation["checks"] if check["name"] == "geometry")
+    assert geometry["figures"]["points"] > 1000
+    assert geometry["figures"]["agree"] == 1
 
 
 def test_the_scene_keeps_nothing_of_the_test_of_a_shader(render):
