@@ -849,11 +849,6 @@ EXPLAINED = [
         {"lens": "equidistant", "resolution": [9, 9]},
         "rigs.LFSphere.camera: is missing the key fov",
     ),
-    (
-        "rigs.LFSphere.camera",
-        {"lens": "stereographic", "fov": 359, "resolution": [2048, 2048]},
-        "rigs.LFSphere.camera: stereographic fisheye, 359° would be rendered with an error of 0.6",
-    ),
     ("render.depth", "z", "render.depth: is 'z', but rigs.LFCuboid.camera"),
     (
         "reprojections.perspective.rigs",

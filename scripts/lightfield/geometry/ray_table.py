@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lightfield.core.errors import UserError
 from lightfield.geometry.lenses.base import Array, RadialLens
 
 INTERVALS = 256
@@ -19,8 +20,10 @@ BEND_INTERVALS = 32
 MARGIN = 16
 # A shader must meet the lens's own rays within this many pixels.
 LARGEST_ERROR = 1e-3
-# Points in each interval where splines are fitted or tested.
+# Points in each interval where the splines are tested, and where the bend is fitted, too. The bend
+# of a lens takes seconds for a million points.
 _STEPS = 4
+_BEND_STEPS = 2
 # How strongly the bend is smooth where the lens has no rays that tell it.
 _SMOOTHNESS = 1e-6
 
@@ -42,8 +45,20 @@ class RayTable:
 
 
 def ray_table(lens: RadialLens) -> RayTable:
-    """Return the table of a lens."""
-    u, v = _around(lens, np.linspace(0, 1, BEND_INTERVALS * _STEPS + 1))
+    """Return the table of a lens. Raises `UserError` if it errs by more than `LARGEST_ERROR`."""
+    table = _table(lens)
+    error = _largest_error(lens, table)
+    if error > LARGEST_ERROR:
+        raise UserError(
+            f"camera: {lens.description}: would be rendered with an error of {error:.2g} pixels, "
+            f"but at most {LARGEST_ERROR:g} is allowed; give it a smaller fov, so that no ray is "
+            "near the angle where the lens ends"
+        )
+    return table
+
+
+def _table(lens: RadialLens) -> RayTable:
+    u, v = _around(lens, np.linspace(0, 1, BEND_INTERVALS * _BEND_STEPS + 1))
     unbent = np.stack(lens._unbent(u, v))
     r = np.hypot(*unbent)
     reach = min(lens._limit, float(np.nanmax(r)))
@@ -56,27 +71,35 @@ def ray_table(lens: RadialLens) -> RayTable:
     return RayTable(reach, angles, bend)
 
 
-def largest_error(lens: RadialLens, table: RayTable) -> float:
+def _largest_error(lens: RadialLens, table: RayTable) -> float:
     """Return by how many pixels the rays of a table differ from the lens's own, at most.
 
     The splines are evaluated in float64 between the points that made them.
     """
+    return _error_of_angles(lens, table) + _error_of_bend(lens, table)
+
+
+def _error_of_angles(lens: RadialLens, table: RayTable) -> float:
+    """Return by how many pixels the spline of θ moves a ray, at most."""
     s = (np.arange(INTERVALS * _STEPS) + 0.5) / (INTERVALS * _STEPS)
     theta = _basis(s, INTERVALS) @ table.angles
     r = table.reach * (1 - (1 - s) ** 2)
     error = np.abs(lens._radius(np.abs(np.sin(theta)), np.cos(theta))) - r
-    error = np.abs(error) / min(lens._unit)
-    largest = float(np.nanmax(error))
+    return float(np.nanmax(np.abs(error)) / min(lens._unit))
+
+
+def _error_of_bend(lens: RadialLens, table: RayTable) -> float:
+    """Return by how many pixels the spline of the bend moves a point of the image, at most."""
     if table.bend is None:
-        return largest
-    places = (np.arange(BEND_INTERVALS * _STEPS) + 0.5) / (BEND_INTERVALS * _STEPS)
+        return 0.0
+    places = (np.arange(BEND_INTERVALS * _BEND_STEPS) + 0.5) / (BEND_INTERVALS * _BEND_STEPS)
     u, v = _around(lens, places)
     right, up = lens._unbent(u, v)
     inside = (np.hypot(right, up) <= table.reach) & _in_image(lens, u, v)
     basis = _basis(places, BEND_INTERVALS)
     moved = np.einsum("yi,xj,ijk->kyx", basis, basis, table.bend) * table.reach
     off = np.hypot((u + moved[0] - right) / lens._unit[0], (v + moved[1] - up) / lens._unit[1])
-    return largest + float(off[inside].max(initial=0))
+    return float(off[inside].max(initial=0))
 
 
 def _around(lens: RadialLens, places: Array) -> tuple[Array, Array]:

@@ -11,9 +11,7 @@ from lightfield.configuration.scene_checks.names import check_folder
 from lightfield.core.names import FILE
 from lightfield.geometry.frames import MOST_VIEWS as MOST_VIEWS_OF_RIG
 from lightfield.geometry.lenses import CameraSettings, Lens
-from lightfield.geometry.lenses.base import RadialLens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
-from lightfield.geometry.ray_table import LARGEST_ERROR, largest_error, ray_table
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
 from lightfield.geometry.rigs.split_setting import Chosen
 
@@ -114,25 +112,12 @@ def small_image(resolution: Sequence[int]) -> str | None:
 
 
 def _check_lens(key: str, settings: CameraSettings) -> None:
-    """Check that Cycles, or a shader in it, can render views through a lens."""
+    """Check that Blender can have the image of a camera, and Cycles its lens, if it is Cycles'."""
     if problem := small_image(settings.resolution):
         raise ValueError(f"{key}.resolution: {problem}")
     lens = settings.make()
     if lens.in_cycles:
         _check_blender_limits(key, settings, lens)
-    elif isinstance(lens, RadialLens):
-        _check_shader(key, lens)
-
-
-def _check_shader(key: str, lens: RadialLens) -> None:
-    """Refuse a lens whose shader would err visibly."""
-    error = largest_error(lens, ray_table(lens))
-    if error > LARGEST_ERROR:
-        raise ValueError(
-            f"{key}: {lens.description} would be rendered with an error of {error:.2g} pixels, "
-            f"and at most {LARGEST_ERROR:g} is allowed; give a smaller fov, so that no ray is "
-            "near the angle at which the lens ends"
-        )
 
 
 def _check_blender_limits(key: str, settings: CameraSettings, lens: Lens) -> None:
