@@ -44,6 +44,25 @@ LACKING = {
         "fov": 200,
         "sensor_size": [36, 30],
     },
+    "division": {"lens": "division", "focal_length": 11, "coefficients": [-0.35]},
+    "fov_model": {"lens": "fov_model", "focal_length": 14, "coefficients": [0.93]},
+    "unified": {"lens": "unified", "focal_length": 20, "coefficients": [0.9]},
+    "extended_unified": {
+        "lens": "extended_unified",
+        "focal_length": 9,
+        "coefficients": [0.628, 1.023],
+    },
+    "double_sphere": {
+        "lens": "double_sphere",
+        "focal_length": 9,
+        "coefficients": [-0.172, 0.593],
+        "principal_point": [30.3, 33.6],
+    },
+    "f_theta": {
+        "lens": "f_theta",
+        "focal_length": 11,
+        "coefficients": [0.01, -0.02, 0.003, -0.001],
+    },
 }
 
 
@@ -258,6 +277,14 @@ def test_depth_of_field_is_that_of_cycles_own_lens(name, render):
     assert np.sqrt(np.mean((shown.light - native.light) ** 2)) < 0.01 * blur
     # Depth is sharp.
     np.testing.assert_allclose(shown.depth, sharp.depth, rtol=1e-6)
+
+
+def test_a_perspective_lens_with_distortion_focuses_on_a_plane(render):
+    own = {"lens": "rectilinear", "focal_length": 21}
+    native = render(own, by_shader=False, samples=64, depth_of_field=True)
+    undistorted = {"lens": "division", "focal_length": 21, "coefficients": [0]}
+    shown = render(undistorted, samples=64, depth_of_field=True)
+    assert np.sqrt(np.mean((shown.light - native.light) ** 2)) < 0.001
 
 
 def test_a_shader_that_cycles_cannot_run_is_refused(render, monkeypatch):

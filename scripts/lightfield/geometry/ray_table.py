@@ -6,6 +6,7 @@ ends with a vertical tangent, as the orthographic one does. So the equations of 
 own class alone.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,11 +44,18 @@ class RayTable:
     angles: Array
     bend: Array | None
 
+    @property
+    def is_ahead(self) -> bool:
+        """Whether all rays lie in front of the camera's plane."""
+        return bool(np.abs(self.angles).max() < math.pi / 2)
+
 
 def ray_table(lens: RadialLens) -> RayTable:
     """Return the table of a lens. Raises `UserError` if it errs by more than `LARGEST_ERROR`."""
-    table = _table(lens)
-    error = _largest_error(lens, table)
+    # Where a lens has no value, it gives NaN.
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        table = _table(lens)
+        error = _largest_error(lens, table)
     if error > LARGEST_ERROR:
         raise UserError(
             f"camera: {lens.description}: would be rendered with an error of {error:.2g} pixels, "

@@ -152,7 +152,7 @@ def _source(lens: RadialLens) -> str:
         bend=_bend(lens) if bends else "",
         limit=slack(np.dtype(np.float32)),
         intervals=INTERVALS,
-        focus=_PLANE if lens.focuses_on_plane and lens.has_z_depth else _SPHERE,
+        focus=_PLANE if lens.focuses_on_plane and table.is_ahead else _SPHERE,
     )
 
 
