@@ -849,11 +849,6 @@ EXPLAINED = [
         {"lens": "equidistant", "resolution": [9, 9]},
         "rigs.LFSphere.camera: is missing the key fov",
     ),
-    (
-        "rigs.LFSphere.camera",
-        {"lens": "stereographic", "fov": 180, "resolution": [9, 9]},
-        "rigs.LFSphere.camera.lens: is 'stereographic', which Cycles does not have",
-    ),
     ("render.depth", "z", "render.depth: is 'z', but rigs.LFCuboid.camera"),
     (
         "reprojections.perspective.rigs",
