@@ -13,6 +13,7 @@ from lightfield.geometry.frames import MOST_VIEWS as MOST_VIEWS_OF_RIG
 from lightfield.geometry.lenses import CameraSettings, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
+from lightfield.geometry.rigs import Path as PathRig
 from lightfield.geometry.rigs.split_setting import Chosen
 
 FLOW_PLACES = "needs views from two or more places"
@@ -80,6 +81,13 @@ def _check_rig(blocks: SceneBlocks, key: str, name: str, rig: Rig) -> None:
         raise ValueError(
             f"render.camera_motion: does not go with {key}.cube_map, whose faces would each "
             "move along axes of their own; render panoramas, and reproject with cube_map"
+        )
+    motion = blocks.render and blocks.render.camera_motion
+    lacks_exposure = isinstance(rig, PathRig) and rig.imu and rig.imu.exposure is None
+    if lacks_exposure and motion and motion.rolling is not None:
+        raise ValueError(
+            f"{key}.imu.exposure: is missing; the times of a rolling shutter's rows need the "
+            "seconds of a view's exposure"
         )
     if rig.is_omnidirectional:
         _check_without_centre(blocks, key, name)
