@@ -91,6 +91,10 @@ class SourceSequence:
         return self.lightfield.lens
 
     @property
+    def lenses(self) -> list[Lens]:
+        return [self.lens]
+
+    @property
     def has_depth(self) -> bool:
         return self.frames[0].has_depth
 

@@ -59,6 +59,8 @@ class Export(Settings, ABC):
     is_of_sequence: ClassVar[bool] = False
     # Whether the export has the times of a rolling shutter's rows.
     has_row_times: ClassVar[bool] = False
+    # Whether one export may have views of several lenses.
+    joins_lenses: ClassVar[bool] = False
     # Whether the export lifts points from the depth of the rendered views.
     needs_surfaces: ClassVar[bool] = False
     # The lists of an export whose files lie beside the views. A * stands for the part of a split.

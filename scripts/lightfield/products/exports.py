@@ -38,9 +38,9 @@ def run(source: Source, options: Export, folder: Path) -> None:
     Replaces an earlier export in a folder of its own, and leaves no files there if it fails. Raises
     `UserError` if such a folder holds other files, or if the consumer cannot take these views.
     """
-    reason = options.refusal(source.lens, source.has_depth)
-    if reason:
-        raise UserError(f"{source.lightfield.path}: {reason}")
+    for lens in source.lenses:
+        if reason := options.refusal(lens, source.has_depth):
+            raise UserError(f"{source.lightfield.path}: {reason}")
     if options.lists_beside_views:
         options.export(source, folder)
         return
@@ -69,7 +69,13 @@ def source_of(settings: ExportSettings[Any], dataset: Path) -> Source:
     views = (settings.source, settings.suffix, test_folders)
     if not options.is_of_sequence:
         training_list = Path(settings.trained_by) if settings.trained_by else None
-        return SourceDataset(dataset, *views, **development, training_list=training_list)
+        return SourceDataset(
+            dataset,
+            *views,
+            **development,
+            training_list=training_list,
+            has_lenses=options.joins_lenses,
+        )
     folders = settings.frames or [path.name for path in dataset.glob(FRAME_FOLDERS)]
     return SourceSequence.of_folders(dataset, folders, *views, **development)
 

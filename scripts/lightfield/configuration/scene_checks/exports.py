@@ -1,7 +1,5 @@
 """Checks exports with the views that they read."""
 
-from collections.abc import Sequence
-
 from lightfield.configuration.scene_blocks import SceneBlocks, look_of
 from lightfield.configuration.scene_checks.names import check_rigs, check_sources
 from lightfield.core.names import VIEWS
@@ -20,10 +18,10 @@ def _check_export(blocks: SceneBlocks, export_key: str, export: Export) -> None:
     """Check that an export's rigs and sources exist, and that its consumer can take them."""
     rigs_key = f"{export_key}.{export.rigs_key}"
     check_rigs(blocks, rigs_key, export.chosen_rigs or ())
-    _check_joined_rigs(blocks, rigs_key, export.joined_rigs)
     key = f"{export_key}.sources"
     developments = blocks.developments
     check_sources(key, export.sources, developments)
+    _check_joined_rigs(blocks, rigs_key, export)
     if look_of(export) and not any(
         source == VIEWS or "exr" in developments[source].formats for source in export.sources
     ):
@@ -47,13 +45,19 @@ def _check_export(blocks: SceneBlocks, export_key: str, export: Export) -> None:
         _check_exported_rigs(blocks, export_key, rigs_key, export, source)
 
 
-def _check_joined_rigs(blocks: SceneBlocks, key: str, names: Sequence[str]) -> None:
-    """Check that rigs can go into one export, which has one lens and one split."""
+def _check_joined_rigs(blocks: SceneBlocks, key: str, export: Export) -> None:
+    """Check that rigs can go into one export, which has one split, and mostly one lens."""
+    names = export.joined_rigs
+    settings = ["frames"]
+    if not export.joins_lenses and any(
+        source == VIEWS or blocks.developments[source].camera is None for source in export.sources
+    ):
+        settings.insert(0, "camera")
     for name in names:
         first, rig = blocks.rigs[names[0]], blocks.rigs[name]
         if first.split in ("validation", "test"):
             raise ValueError(f"{key}: begins with {names[0]}, which tests; name a rig that trains")
-        for setting in ("camera", "frames"):
+        for setting in settings:
             if getattr(rig, setting) != getattr(first, setting):
                 raise ValueError(f"rigs.{name}.{setting}: must be as in {names[0]}; see {key}")
         if (rig.split is None) != (first.split is None):

@@ -1,0 +1,129 @@
+"""Exports of heads: several cameras with fixed poses on one body, as their consumers read them.
+
+The scene is the inside of a sphere, so all its points are known.
+"""
+
+import numpy as np
+import pycolmap
+import pytest
+from oracles.readers.ply import read_vertices
+from pydantic import TypeAdapter
+from sphere import LENSES, write_views
+from test_exports import on_sphere
+
+from lightfield.configuration.heads import with_cameras
+from lightfield.core.errors import UserError
+from lightfield.export.source import SourceDataset
+from lightfield.exporters import EXPORTERS
+from lightfield.formats.lightfield import LightField
+from lightfield.geometry import lenses, rigs
+from lightfield.products import exports
+
+# COLMAP's cameras look along +Z, with Y down.
+FLIP = np.diag([1.0, -1, -1, 1])
+BODY = {"type": "ring", "count": 4, "size": 1.6, "center": [0.1, -0.3, 0.2], "look_at": [0, 0, 3]}
+# Three cameras, with lenses, sizes and places of their own.
+HEAD = {
+    "left": {"camera": LENSES["perspective"], "position": [-0.1, 0, 0.02], "rotation": [0, 3, 0]},
+    "right": {"camera": LENSES["opencv"], "position": [0.12, 0.01, 0], "rotation": [2, -5, 1]},
+    "rear": {"camera": LENSES["fisheye"], "position": [0, 0, 0.2], "rotation": [-10, 170, 4]},
+}
+BACK_TO_BACK = {
+    "front": {"camera": LENSES["wide"], "position": [0, 0, -0.02]},
+    "back": {"camera": LENSES["wide"], "position": [0, 0, 0.02], "rotation": [0, 180, 0]},
+}
+
+
+def datasets(folder, head, name="car", **rig):
+    """Write the datasets of a head's cameras. Return their folders by the names of their rigs."""
+    body = rigs.from_settings({**BODY, "head": head, **rig})
+    folders = {}
+    for rig_name, camera_rig in with_cameras({name: body}).items():
+        folders[rig_name] = folder / rig_name / "dataset"
+        write_views(folders[rig_name], head[camera_rig.mount.name]["camera"], camera_rig)
+    return folders
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory):
+    return datasets(tmp_path_factory.mktemp("heads"), HEAD)
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    return datasets(tmp_path_factory.mktemp("heads"), BACK_TO_BACK, "dual")
+
+
+def exported(folders, name, folder, **options):
+    """Export the views of all rigs together, as the workflow does."""
+    (first, *_) = folders.values()
+    together = {"together": [*folders]} if len(folders) > 1 else {}
+    options = {"sources": ["views"], **together, **options}
+    settings = TypeAdapter(EXPORTERS[name]).validate_python(options)
+    others = dict([*folders.items()][1:])
+    has_lenses = settings.joins_lenses
+    source = SourceDataset(first, "", ".exr", others, has_lenses=has_lenses)
+    exports.run(source, settings, folder)
+    return folder
+
+
+def views_of(folders, head):
+    """Return the views of a head's cameras by the names of their files in an export."""
+    return {
+        f"{camera}/{view.name}.png": view
+        for camera, folder in zip(head, folders.values(), strict=True)
+        for view in LightField.read(folder / "lightfield.json").views
+    }
+
+
+@pytest.mark.parametrize("form", ["text", "binary"])
+def test_colmap_reads_one_rig_whose_frames_have_all_cameras(three, tmp_path, form):
+    folder = exported(three, "colmap", tmp_path / "colmap", format=form, points=300)
+    model = pycolmap.Reconstruction(folder / "sparse/0")
+    assert (model.num_rigs(), model.num_cameras(), model.num_frames()) == (1, 3, 4)
+    assert [model.cameras[number].model_name for number in (1, 2, 3)] == [
+        "PINHOLE",
+        "OPENCV_FISHEYE",
+        "OPENCV_FISHEYE",
+    ]
+    (rig,) = model.rigs.values()
+    assert rig.num_sensors() == 3
+    views = views_of(three, HEAD)
+    assert {image.name for image in model.images.values()} == views.keys()
+    for frame in model.frames.values():
+        names = [model.images[data.id].name for data in frame.data_ids]
+        # All images of a frame have one name, in the folders of the three cameras.
+        assert len(names) == 3
+        assert len({name.partition("/")[2] for name in names}) == 1
+    for image in model.images.values():
+        # The image's pose follows from the frame's and from the rig's.
+        world_from_camera = np.vstack([image.cam_from_world().inverse().matrix(), [0, 0, 0, 1]])
+        np.testing.assert_allclose(
+            world_from_camera @ FLIP, views[image.name].world_from_camera, atol=2e-12
+        )
+        assert (folder / "images" / image.name).is_file()
+        seen = [point for point in image.points2D if point.has_point3D()]
+        assert seen
+        for point in seen:
+            place = model.points3D[point.point3D_id].xyz
+            np.testing.assert_allclose(image.project_point(place), point.xy, atol=1e-6)
+    on_sphere(np.array([point.xyz for point in model.points3D.values()]), 1e-5)
+
+
+def test_colmap_writes_the_rig_as_colmap_itself_does(three, tmp_path):
+    ours = exported(three, "colmap", tmp_path / "ours", points=50) / "sparse/0"
+    model = pycolmap.Reconstruction(ours)
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    model.write_binary(theirs)
+    assert (theirs / "rigs.bin").read_bytes() == (ours / "rigs.bin").read_bytes()
+    again = pycolmap.Reconstruction(theirs)
+    assert {*again.frames} == {*model.frames}
+
+
+def test_one_camera_of_a_head_is_exported_as_any_rig(three, tmp_path):
+    folder = exported({"car_left": three["car_left"]}, "colmap", tmp_path / "one")
+    assert {path.name for path in (folder / "images").iterdir()} == {
+        f"view_{number:04d}f.png" for number in range(4)
+    }
+    assert not (folder / "sparse/0/rigs.bin").exists()
