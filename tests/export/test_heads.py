@@ -3,9 +3,13 @@
 The scene is the inside of a sphere, so all its points are known.
 """
 
+import json
+
+import cv2
 import numpy as np
 import pycolmap
 import pytest
+import yaml
 from oracles.readers.ply import read_vertices
 from pydantic import TypeAdapter
 from sphere import LENSES, write_views
@@ -61,9 +65,7 @@ def exported(folders, name, folder, **options):
     options = {"sources": ["views"], **together, **options}
     settings = TypeAdapter(EXPORTERS[name]).validate_python(options)
     others = dict([*folders.items()][1:])
-    has_lenses = settings.joins_lenses
-    source = SourceDataset(first, "", ".exr", others, has_lenses=has_lenses)
-    exports.run(source, settings, folder)
+    exports.run(SourceDataset(first, "", ".exr", others), settings, folder)
     return folder
 
 
@@ -127,3 +129,91 @@ def test_one_camera_of_a_head_is_exported_as_any_rig(three, tmp_path):
         f"view_{number:04d}f.png" for number in range(4)
     }
     assert not (folder / "sparse/0/rigs.bin").exists()
+
+
+def opencv_pixels(camera, points):
+    """Project points (n, 3), in OpenCV's axes, as the distortion model of a camchain says."""
+    fx, fy, cx, cy = camera["intrinsics"]
+    matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    distortion = np.array(camera["distortion_coeffs"])
+    still = np.zeros(3)
+    if camera["distortion_model"] == "equidistant":
+        pixels, _ = cv2.fisheye.projectPoints(points[:, None], still, still, matrix, distortion)
+    else:
+        pixels, _ = cv2.projectPoints(points, still, still, matrix, distortion)
+    return pixels.reshape(-1, 2)
+
+
+def test_opencv_projects_through_a_camchain_as_the_views_do(three, tmp_path):
+    folder = exported(three, "kalibr", tmp_path / "kalibr")
+    chain = yaml.safe_load((folder / "camchain.yaml").read_text())
+    assert [*chain] == ["cam0", "cam1", "cam2"]
+    assert [camera["rostopic"] for camera in chain.values()] == [
+        "/left/image_raw",
+        "/right/image_raw",
+        "/rear/image_raw",
+    ]
+    views = views_of(three, HEAD)
+    for number, (name, settings) in enumerate(HEAD.items()):
+        camera = chain[f"cam{number}"]
+        lens = lenses.from_camera(settings["camera"])
+        assert camera["resolution"] == [lens.width, lens.height]
+        rays = lens.rays(*np.random.default_rng(number).uniform(10, 40, (2, 50)))
+        # Kalibr's first pixel has its centre at (0, 0), and ours at (½, ½).
+        ours = lens.pixels(rays) - 0.5
+        np.testing.assert_allclose(opencv_pixels(camera, rays * [1, -1, -1]), ours, atol=1e-6)
+        if number:
+            last, this = (
+                views[f"{each}/view_0000f.png"].world_from_camera for each in (before, name)
+            )
+            expected = FLIP @ np.linalg.inv(this) @ last @ FLIP
+            np.testing.assert_allclose(camera["T_cn_cnm1"], expected, atol=5e-12)
+        before = name
+
+
+def test_nerfstudio_gives_each_frame_its_own_intrinsics(three, tmp_path):
+    fisheyes = {name: three[name] for name in ("car_right", "car_rear")}
+    folder = exported(fisheyes, "nerfstudio", tmp_path / "nerfstudio", points=100)
+    content = json.loads((folder / "transforms.json").read_text())
+    assert content["camera_model"] == "OPENCV_FISHEYE"
+    assert "fl_x" not in content
+    head = {name: HEAD[name] for name in ("right", "rear")}
+    views = {f"images/{name}": view for name, view in views_of(fisheyes, head).items()}
+    assert {frame["file_path"] for frame in content["frames"]} == views.keys()
+    for frame in content["frames"]:
+        camera = frame["file_path"].split("/")[1]
+        lens = lenses.from_camera(HEAD[camera]["camera"])
+        assert (frame["w"], frame["h"]) == (lens.width, lens.height)
+        assert (frame["cx"], frame["cy"]) == lens.center
+        rays = lens.rays(*np.random.default_rng(1).uniform(10, 40, (2, 50)))
+        matrix = np.array([[frame["fl_x"], 0, frame["cx"]], [0, frame["fl_y"], frame["cy"]]])
+        distortion = np.array([frame[f"k{n}"] for n in range(1, 5)])
+        still = np.zeros(3)
+        found, _ = cv2.fisheye.projectPoints(
+            (rays * [1, -1, -1])[:, None],
+            still,
+            still,
+            np.vstack([matrix, [0, 0, 1]]),
+            distortion,
+        )
+        np.testing.assert_allclose(found.reshape(-1, 2), lens.pixels(rays), atol=1e-6)
+        np.testing.assert_array_equal(
+            frame["transform_matrix"], views[frame["file_path"]].world_from_camera
+        )
+    vertices = read_vertices(folder / "points.ply")
+    on_sphere(np.stack([vertices[name] for name in "xyz"], axis=-1), 1e-5)
+
+
+def test_points_of_both_sides_lie_on_the_same_surface(two, tmp_path):
+    """The cameras see past 180°, so they share a band of the sphere."""
+    folder = exported(two, "nerfstudio", tmp_path / "nerfstudio", points=2000)
+    vertices = read_vertices(folder / "points.ply")
+    points = np.stack([vertices[name] for name in "xyz"], axis=-1)
+    on_sphere(points, 1e-5)
+    assert len(points) > 1000
+
+
+def test_lenses_that_a_consumer_cannot_mix_are_refused(three, tmp_path):
+    for name in ("nerf_synthetic", "lichtfeld", "nerfstudio"):
+        with pytest.raises(UserError, match="camera: must be the same as in"):
+            exported(three, name, tmp_path / name)

@@ -62,10 +62,12 @@ def places(cameras: Sequence[Sensor]) -> list[list[View]]:
 
 
 def from_first(cameras: Sequence[Sensor]) -> list[Floats]:
-    """Return the matrix (4, 4) from each camera of a head to the first, in metres."""
+    """Return the matrix (4, 4) from each camera of a head to the first, in metres.
+
+    Empty for cameras that are no head.
+    """
     mounts = [camera.mount.body_from_camera for camera in cameras if camera.mount]
-    first_from_body = np.linalg.inv(mounts[0])
-    return [np.asarray(first_from_body @ mount) for mount in mounts]
+    return [np.linalg.inv(mounts[0]) @ mount for mount in mounts]
 
 
 def _mounts(source: SourceDataset) -> dict[str, HeadCamera]:

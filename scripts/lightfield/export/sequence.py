@@ -91,8 +91,9 @@ class SourceSequence:
         return self.lightfield.lens
 
     @property
-    def lenses(self) -> list[Lens]:
-        return [self.lens]
+    def lenses(self) -> dict[Lens, Path]:
+        """The different lenses of the views, each with a lightfield.json that has it."""
+        return self.frames[0].lenses
 
     @property
     def has_depth(self) -> bool:

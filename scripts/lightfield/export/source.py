@@ -30,7 +30,6 @@ class SourceDataset:
     - ``beside``: the datasets of other rigs, by the rigs' names. Names of their views begin with
       the rig's name: spiral_view_0000f. Each view keeps its part of the split.
     - ``renamed``: if there are any, only these views in this order: new names and the views'.
-    - ``has_lenses``: whether the views may have several lenses. `view` has the lens of each.
     - ``exposure``, ``reinhard``: how EXR views are developed: stops, and the value that becomes
       white. ``reinhard`` 1 leaves light as it is. PNG views are used as they are.
     - ``look_name``: the look with which EXR views are developed instead, if they are.
@@ -46,7 +45,6 @@ class SourceDataset:
     renamed: Mapping[str, str] = field(default_factory=dict)
     look_name: str | None = None
     training_list: Path | None = None
-    has_lenses: bool = False
 
     @cached_property
     def lightfield(self) -> LightField:
@@ -70,14 +68,7 @@ class SourceDataset:
 
     @cached_property
     def _shown(self) -> tuple[LightField, dict[str, OpenView]]:
-        lightfield, views = self._joined(self.name, self.suffix)
-        for view in () if self.has_lenses else views.values():
-            if view.lens != lightfield.lens:
-                raise UserError(
-                    f"{view.dataset.lightfield.path}: camera: must be the same as in "
-                    f"{lightfield.path}"
-                )
-        return lightfield, views
+        return self._joined(self.name, self.suffix)
 
     @cached_property
     def _rendered(self) -> tuple[LightField, dict[str, OpenView]]:
@@ -111,9 +102,13 @@ class SourceDataset:
         return self.lightfield.lens
 
     @property
-    def lenses(self) -> list[Lens]:
-        """The different lenses of the views."""
-        return [*dict.fromkeys(self.view(view).lens for view in self.lightfield.views)]
+    def lenses(self) -> dict[Lens, Path]:
+        """The different lenses of the views, each with a lightfield.json that has it."""
+        lenses: dict[Lens, Path] = {}
+        for view in self.lightfield.views:
+            dataset = self.view(view).dataset
+            lenses.setdefault(dataset.lens, dataset.lightfield.path)
+        return lenses
 
     @property
     def has_depth(self) -> bool:

@@ -113,7 +113,9 @@ class Colmap(ColmapModel):
     rank = 2
     loader = "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')"
     needs_surfaces = True
-    joins_lenses = True
+
+    def joins(self, lens: Lens, other: Lens) -> bool:
+        return True
 
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write the model of a source's views into ``folder``."""

@@ -5,6 +5,7 @@ from lightfield.configuration.scene_checks.names import check_rigs, check_source
 from lightfield.core.names import VIEWS
 from lightfield.exporters.base import NO_DEPTH, NOT_EXR, Export
 from lightfield.formats import light_groups, published
+from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.rigs import Poses, Rig
 
 
@@ -46,20 +47,18 @@ def _check_export(blocks: SceneBlocks, export_key: str, export: Export) -> None:
 
 
 def _check_joined_rigs(blocks: SceneBlocks, key: str, export: Export) -> None:
-    """Check that rigs can go into one export, which has one split, and mostly one lens."""
+    """Check that rigs can go into one export, which has one split, and lenses that go together."""
     names = export.joined_rigs
-    settings = ["frames"]
-    if not export.joins_lenses and any(
-        source == VIEWS or blocks.developments[source].camera is None for source in export.sources
-    ):
-        settings.insert(0, "camera")
     for name in names:
         first, rig = blocks.rigs[names[0]], blocks.rigs[name]
         if first.split in ("validation", "test"):
             raise ValueError(f"{key}: begins with {names[0]}, which tests; name a rig that trains")
-        for setting in settings:
-            if getattr(rig, setting) != getattr(first, setting):
-                raise ValueError(f"rigs.{name}.{setting}: must be as in {names[0]}; see {key}")
+        for source in export.sources:
+            lenses = (_camera_of(blocks, each, source).make() for each in (first, rig))
+            if not export.joins(*lenses):
+                raise ValueError(f"rigs.{name}.camera: must be as in {names[0]}; see {key}")
+        if rig.frames != first.frames:
+            raise ValueError(f"rigs.{name}.frames: must be as in {names[0]}; see {key}")
         if (rig.split is None) != (first.split is None):
             raise ValueError(
                 f"{key}: only one of {names[0]} and {name} has a split; give both a split, or none"
@@ -105,7 +104,7 @@ def _export_refusal(blocks: SceneBlocks, export: Export, rig: Rig, source: str) 
     if rig.is_omnidirectional:
         return "has views without a centre, as omnidirectional stereo has"
     reprojection = blocks.developments.get(source)
-    camera = (reprojection and reprojection.camera) or rig.camera
+    camera = _camera_of(blocks, rig, source)
     is_rendered = renders_depth(blocks, rig)
     has_depth = is_rendered and (reprojection is None or reprojection.has_depth)
     lacks_surfaces = export.needs_surfaces and not is_rendered
@@ -118,6 +117,12 @@ def _export_refusal(blocks: SceneBlocks, export: Export, rig: Rig, source: str) 
     if source not in blocks.reprojections:
         return f"{refusal}; export the sensor's source"
     return f"{refusal}; give reprojections.{source} format: exr"
+
+
+def _camera_of(blocks: SceneBlocks, rig: Rig, source: str) -> CameraSettings:
+    """Return the camera of the views of a rig in a source."""
+    reprojection = blocks.developments.get(source)
+    return (reprojection and reprojection.camera) or rig.camera
 
 
 def renders_depth(blocks: SceneBlocks, rig: Rig) -> bool:

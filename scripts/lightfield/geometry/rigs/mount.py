@@ -35,7 +35,8 @@ class Mounting(Settings):
         matrix = np.eye(4)
         matrix[:3, :3] = euler_to_matrix(np.radians(np.asarray(self.rotation, dtype=float)))
         matrix[:3, 3] = self.position
-        return matrix
+        # Without noise such as 1e-16.
+        return np.asarray(np.round(matrix, 15) + 0.0)
 
 
 class HeadCamera(Mounting):
