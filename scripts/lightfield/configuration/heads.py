@@ -43,7 +43,8 @@ def with_cameras(rigs: dict[str, Rig]) -> dict[str, Rig]:
 def keys_as_written(problem: str, content: Any) -> str:
     """Return a problem with the keys that a scene YAML's ``content`` has for its heads' rigs.
 
-    rigs.car_front.camera becomes rigs.car.head.front.camera, and rigs.car_front.split rigs.car.split.
+    rigs.car_front.camera becomes rigs.car.head.front.camera. rigs.car_front.split becomes
+    rigs.car.split.
     """
     for rig, camera in _cameras(content):
         key = re.escape(f"rigs.{camera_rig(rig, camera)}")

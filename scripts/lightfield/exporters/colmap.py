@@ -1,6 +1,6 @@
 """Writes a COLMAP model, for gsplat, 3DGRUT, Brush and the original 3D Gaussian splatting.
 
-- ``sparse/0/``: cameras, images and points3D, in binary or as text. With the cameras of a head, also
+- ``sparse/0/``: cameras, images and points3D, in binary or as text. For the cameras of a head also
   rigs and frames. Their images lie in a folder for each camera, with equal names.
 - ``images/``: the views as 8-bit PNG.
 - ``masks/<image>.png``: for views with pixels that show nothing. 0 means ignored.

@@ -72,18 +72,18 @@ def _camera(sensor: heads.Sensor, number: int) -> dict[str, Any]:
     """Return the keys of a camera."""
     lens = sensor.lens
     if isinstance(lens, Rectilinear):
-        focal, distortion = cameras.focal_pixels(lens), (0.0,) * 4
         model = "radtan"
+        fx, fy = cameras.focal_pixels(lens)
+        distortion = [0.0] * 4
     else:
-        fx, fy, *coefficients = cameras.opencv_fisheye(lens)
-        focal, distortion = (fx, fy), tuple(coefficients)
         model = "equidistant"
+        fx, fy, *distortion = cameras.opencv_fisheye(lens)
     name = sensor.mount.name if sensor.mount else f"cam{number}"
     return {
         "camera_model": "pinhole",
-        "intrinsics": [*focal, lens.center[0] - 0.5, lens.center[1] - 0.5],
+        "intrinsics": [fx, fy, lens.center[0] - 0.5, lens.center[1] - 0.5],
         "distortion_model": model,
-        "distortion_coeffs": [*distortion],
+        "distortion_coeffs": distortion,
         "resolution": [lens.width, lens.height],
         "rostopic": f"/{name}/image_raw",
     }

@@ -25,7 +25,8 @@ def write_heads(job: ListHeads) -> None:
     for head in heads.values():
         head["frames"] = [*head["frames"].values()]
     write_json(job.output, heads)
-    print(", ".join(f"{name}: {units.count(len(h['cameras']), 'camera')}" for name, h in heads.items()))
+    counts = {name: units.count(len(head["cameras"]), "camera") for name, head in heads.items()}
+    print(", ".join(f"{name}: {count}" for name, count in counts.items()))
 
 
 def _add(heads: dict[str, Any], lightfield: LightField, folder: str) -> None:
