@@ -1,6 +1,12 @@
 # The places of the cameras, and their lens.
 from lightfield.workflow.arguments import optional
-from lightfield.workflow.jobs import CHECK_CAMERAS, FREE_PLACES, HEADS, LIGHTFIELD, SPLITS
+from lightfield.workflow.jobs import (
+    CHECK_CAMERAS,
+    FREE_PLACES,
+    HEADS,
+    LIGHTFIELD,
+    SPLITS,
+)
 
 
 # Only a random rig's places depend on the scene.

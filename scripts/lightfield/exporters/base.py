@@ -196,7 +196,7 @@ class Developed(Export):
         return {key: value for key, value in super().recorded.items() if key != "look"}
 
 
-class ForTraining(Developed, Joined):
+class ForTraining(Joined, Developed):
     """Exports to train with, which may have the views of several rigs."""
 
     is_for_training = True
