@@ -34,9 +34,7 @@ def read(path: Path) -> dict[str, dict[str, Any]]:
         scene = check_scene(text, path.name)
     rigs = parse_yaml(text, path.name).get("rigs", {})
     return {
-        name: rigs.get(name) or as_written(rig)
-        for name, rig in scene.rigs.items()
-        if not rig.mount
+        name: rigs.get(name) or as_written(rig) for name, rig in scene.rigs.items() if not rig.mount
     }
 
 

@@ -11,10 +11,12 @@ import numpy as np
 import pycolmap
 import pytest
 import yaml
+from oracles.readers import ncore
+from oracles.readers.contents import Exported
 from oracles.readers.ply import read_vertices
 from pydantic import TypeAdapter
-from sphere import LENSES, write_views
-from test_exports import on_sphere
+from sphere import LENSES, colour_of, write_views
+from test_exports import ncore_pixels, on_sphere
 
 from lightfield.configuration.heads import with_cameras
 from lightfield.core.errors import UserError
@@ -22,6 +24,7 @@ from lightfield.export.source import SourceDataset
 from lightfield.exporters import EXPORTERS
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
+from lightfield.imaging import images
 from lightfield.products import exports
 
 # COLMAP's cameras look along +Z, with Y down.
@@ -215,3 +218,47 @@ def test_lenses_that_a_consumer_cannot_mix_are_refused(three, tmp_path):
     for name in ("nerf_synthetic", "lichtfeld", "nerfstudio"):
         with pytest.raises(UserError, match="camera: must be the same as in"):
             exported(three, name, tmp_path / name)
+
+
+def test_ncore_has_each_camera_at_the_same_times(two, tmp_path):
+    folder = exported(two, "ncore", tmp_path / "ncore", points=400)
+    (entry,) = json.loads((folder / "views.json").read_text())["component_stores"]
+    assert [*entry["components"]["cameras"]] == ["front", "back"]
+    store = ncore.Store(folder / entry["path"], Exported())
+    frame = "lidars/points/frames/0"
+    directions = store.array(f"{frame}/ray_bundle/direction").astype(float)
+    points = directions * store.array(f"{frame}/ray_bundle_returns/distance_m")[0][:, None]
+    on_sphere(points, 1e-5)
+    poses = store.attributes("poses/default/dynamic_poses")
+    assert {*poses} == {"('front', 'world')", "('back', 'world')"}
+    views = views_of(two, BACK_TO_BACK)
+    for name in BACK_TO_BACK:
+        frames = store.attributes(f"cameras/{name}/frames")["frames_timestamps_us"]
+        of_camera = poses[f"('{name}', 'world')"]
+        assert (
+            [end for _, end in frames]
+            == of_camera["timestamps_us"]
+            == [0, 10**6, 2 * 10**6, 3 * 10**6]
+        )
+        lens = store.attributes(f"intrinsics/default/cameras/{name}")
+        for (_, end), pose in zip(frames, np.array(of_camera["poses"]), strict=True):
+            place = f"cameras/{name}/frames/{end}"
+            view = views[store.attributes(f"{place}/generic_data")["name"] + ".png"]
+            np.testing.assert_array_equal(pose @ FLIP, view.world_from_camera)
+            (tmp_path / "view.png").write_bytes(store.array(f"{place}/image").tobytes())
+            picture = images.read_image(tmp_path / "view.png").srgb
+            mask = store.array(f"{place}/generic_data/mask")
+            pixels = ncore_pixels(lens, (points - pose[:3, 3]) @ pose[:3, :3])
+            with np.errstate(invalid="ignore"):
+                inside = ((pixels >= 0) & (pixels < 64)).all(axis=1)
+            column, row = np.floor(pixels[inside]).astype(int).T
+            has_light = mask[row, column] > 0
+            assert has_light.sum() > 50
+            expected = colour_of(points[inside][has_light])
+            np.testing.assert_allclose(picture[row, column][has_light], expected, atol=6)
+
+
+def test_a_camera_with_a_name_of_ncores_is_refused(tmp_path):
+    head = dict.fromkeys(("front", "points"), BACK_TO_BACK["front"])
+    with pytest.raises(UserError, match="head: NCore has a points itself"):
+        exported(datasets(tmp_path, head), "ncore", tmp_path / "ncore")
