@@ -376,6 +376,29 @@ REFUSED = [
     ),
     *(("rigs.LFSphere.stereo", value) for value in ({}, 0.065)),
     ("rigs.LFSphere.stereo", {"distance": 1, "omnidirectional": True}),
+    *(
+        ("rigs.A", {"type": "plane", "cameras": [2, 1], **keys}, f"rigs.A.{key}")
+        for key, keys in (
+            ("camera", {"camera": CAMERA, "head": {"left": {"camera": CAMERA}}}),
+            ("cube_map", {"cube_map": True, "head": {"left": {"camera": CAMERA}}}),
+            ("stereo", {"stereo": {"distance": 0.1}, "head": {"left": {"camera": CAMERA}}}),
+            ("size", {"size": "fit", "head": {"left": {"camera": CAMERA}}}),
+            ("center", {"center": "fit", "head": {"left": {"camera": CAMERA}}}),
+            ("head", {"head": {}}),
+            ("head", {"head": ["left", "right"]}),
+            ("head.left", {"head": {"left": {}}}),
+            ("head.left.camera.fov", {"head": {"left": {"camera": CAMERA | {"fov": 400}}}}),
+            ("head.left.position", {"head": {"left": {"camera": CAMERA, "position": [1, 2]}}}),
+            ("head.left.rotation", {"head": {"left": {"camera": CAMERA, "rotation": 90}}}),
+            # Blender's limits. The checks of the rig A_left find these.
+            ("head.left.camera", {"head": {"left": {"camera": CAMERA | {"fov": 5}}}}),
+            (
+                "head.left.camera.resolution",
+                {"head": {"left": {"camera": CAMERA | {"resolution": [2, 2]}}}},
+            ),
+            ("split", {"head": {"left": {"camera": CAMERA}}, "split": {"test": ["nobody"]}}),
+        )
+    ),
     *(("rigs.LFSphere.split", value) for value in ("even", "train", True, {"test": ["nobody"]})),
     *(("rigs.LFSphere.split", {"every": value}, "rigs.LFSphere.split.every") for value in (1, 2.5)),
     *(("rigs.LFSphere.look_at", value) for value in ([0, 0], "origin", [float("nan")] * 3)),

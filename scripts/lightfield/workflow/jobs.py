@@ -259,6 +259,14 @@ SPLITS = Job(
     fields=fields.splits,
     is_local=True,
 )
+HEADS = Job(
+    "{scene}/heads",
+    views.ListHeads,
+    "cameras",
+    _costs(JOB),
+    fields=fields.heads,
+    is_local=True,
+)
 EXPORT = Job(
     "{scene}/{rig}/{source}export_{format}",
     exports.ExportViews,

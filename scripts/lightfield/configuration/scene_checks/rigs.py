@@ -44,7 +44,7 @@ def _check_rig(blocks: SceneBlocks, key: str, name: str, rig: Rig) -> None:
     """Check a rig with its camera, its file and the depth."""
     camera = rig.camera
     if camera is None:
-        raise ValueError(f"{key}: is missing the key camera")
+        raise ValueError(f"{key}: is missing the key camera, or head")
     if isinstance(rig, Poses) and not Path(rig.file).is_file():
         raise ValueError(f"{key}.file: is {rig.file!r}; there is no such file")
     if blocks.scene.blend is None and isinstance(rig, BlendCamera):
