@@ -291,7 +291,7 @@ def test_a_lens_ends_where_it_turns_over() -> None:
     assert message is not None
     assert "ends at 60.78°" in message
     assert "1.186 focal lengths" in message
-    assert "2.8 % of the image" in message
+    assert "2.7 % of the image" in message
     clipped = BrownConrady(
         width=640, height=480, focal_length=17, coefficients=TURNING, fov=math.radians(100)
     )
