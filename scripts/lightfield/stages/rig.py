@@ -9,6 +9,7 @@ from pydantic import Field, PlainSerializer
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.core.names import FILE, INVENTORY
 from lightfield.engine.stage import ByHand, PlainStage, Stage, option, reads, writes
+from lightfield.geometry.boards import Boards
 from lightfield.geometry.rigs import Random, as_written
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.settings.base import Settings
@@ -35,6 +36,7 @@ class FreePlacesSettings(Settings):
     view_layers: Literal["all"] | list[str] | None = Field(
         None, description="As in the scene YAML."
     )
+    targets: Boards | None = Field(None, description="As in the scene YAML.")
 
 
 class FreePlaces(Stage[FreePlacesSettings]):
