@@ -83,6 +83,18 @@ class MakeLightfield(Stage[LightfieldSettings]):
     output: Path = writes("lightfield.json to write")
 
 
+class FindCorners(PlainStage):
+    """Finds the corners of calibration boards in each view."""
+
+    name = "corners"
+    function = "lightfield.rendering.inspection.corners:write"
+
+    blend: Path = reads("the scene's .blend")
+    lightfield: Path = reads("lightfield.json of the dataset")
+    inventory: Path | None = reads(INVENTORY, None)
+    output: Path = writes("JSON to write")
+
+
 class CheckCameras(PlainStage):
     """Finds cameras that are inside geometry, or that would show it wrongly."""
 

@@ -40,9 +40,6 @@ def add(boards: dict[str, Board]) -> None:
 
 def _material(name: str, reflected: float) -> Any:
     material = bpy.data.materials.new(name)
-    if not material.node_tree:
-        # Since Blender 5.0, every material has nodes, and asking for them warns.
-        material.use_nodes = True
     shader = material.node_tree.nodes["Principled BSDF"]
     shader.inputs["Base Color"].default_value = (reflected, reflected, reflected, 1)
     shader.inputs["Roughness"].default_value = 1
