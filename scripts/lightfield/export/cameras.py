@@ -3,6 +3,7 @@
 import math
 
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
@@ -10,7 +11,7 @@ from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 
-def focal_pixels(lens: Rectilinear | KannalaBrandt) -> tuple[float, float]:
+def focal_pixels(lens: Rectilinear | CalibratedLens) -> tuple[float, float]:
     """Return a lens's focal length in pixels, across and down."""
     return (
         lens.focal_length * lens.width / lens.sensor[0],

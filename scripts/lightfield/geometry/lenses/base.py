@@ -321,7 +321,11 @@ class Lens(ABC):
 
 
 class RadialLens(Lens):
-    """A lens whose r depends on θ alone. r is in the units of `_unit`."""
+    """A lens whose r depends on θ alone. r is in the units of `_unit`.
+
+    u runs right and v runs up from the principal point, in the same units. A lens that is not quite
+    radial overrides `_bent` and `_unbent`.
+    """
 
     @property
     @abstractmethod
@@ -341,9 +345,18 @@ class RadialLens(Lens):
     def _radius(self, sin: Array, cos: Array) -> Array:
         """Return r at θ, given as sin θ ≥ 0 and cos θ. NaN where the lens has none."""
 
+    def _unbent(self, u: Array, v: Array) -> tuple[Array, Array]:
+        """Return where the image's points (u, v) would lie if nothing but θ moved them."""
+        return u, v
+
+    def _bent(self, u: Array, v: Array) -> tuple[Array, Array]:
+        """Return the image's points of (u, v), as `_unbent` does in the other direction."""
+        return u, v
+
     def _rays(self, x: Array, y: Array) -> Array:
         u = (x - self.center[0]) * self._unit[0]
         v = (self.center[1] - y) * self._unit[1]
+        u, v = self._unbent(u, v)
         r = np.hypot(u, v)
         with np.errstate(invalid="ignore", divide="ignore"):
             sin, cos = self._sin_cos(r)
@@ -373,6 +386,7 @@ class RadialLens(Lens):
             axis = side == 0
             u[axis] = 0
             v[axis] = r[axis]
+            u, v = self._bent(u, v)
             pixels = np.stack(
                 [self.center[0] + u / self._unit[0], self.center[1] - v / self._unit[1]]
             )
