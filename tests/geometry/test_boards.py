@@ -1,4 +1,4 @@
-"""Boards have the cells that OpenCV draws and detects, and the corners that OpenCV and Kalibr have."""
+"""Boards: the cells that OpenCV draws and detects, and the corners of OpenCV and Kalibr."""
 
 import cv2
 import numpy as np

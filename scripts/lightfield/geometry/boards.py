@@ -179,7 +179,9 @@ class Checkerboard(Board):
     def corners(self) -> Floats:
         across, down = (np.arange(1, count) for count in self.squares)
         y, x = np.meshgrid(down, across, indexing="ij")
-        return self.square * np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=-1)
+        return np.stack(
+            [self.square * x.ravel(), self.square * y.ravel(), np.zeros(x.size)], axis=-1
+        )
 
 
 class Chessboard(Checkerboard):
@@ -318,7 +320,8 @@ _BOARDS: TypeAdapter[Boards] = TypeAdapter(Boards, config=ConfigDict(defer_build
 
 def from_settings(content: Mapping[str, Any], file: str) -> dict[str, Board]:
     """Return the boards of a block `targets`, by their names. Raises `UserError` with ``file``."""
-    return {**checked(_BOARDS, content, file)}
+    known: Boards = checked(_BOARDS, content, file)
+    return {**known}
 
 
 def _check_count(key: str, needed: int, dictionary: str) -> None:

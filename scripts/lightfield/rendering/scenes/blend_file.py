@@ -69,8 +69,9 @@ def open_scene(
     """Open a .blend with its scripts disabled. Return the names of the view layers to render.
 
     ``scene_block`` is the block ``scene`` of a scene YAML. Its ``scene_name`` and ``view_layers``
-    choose the scene and its view layers, and its ``targets`` are added. ``inventory`` lists the files that the .blend reads, which
-    become inputs of the job at work. The file ``printed`` gets what Blender prints.
+    choose the scene and its view layers, and its ``targets`` are added. ``inventory`` lists the
+    files that the .blend reads, which become inputs of the job at work. The file ``printed`` gets
+    what Blender prints.
 
     Raises `UserError` if Blender cannot read the file, or if the scene or a view layer is missing.
     Also raises it if a newer Blender saved the file or a linked library: this one would lose data.
