@@ -169,10 +169,8 @@ class Developed(Export):
         return {key: value for key, value in super().recorded.items() if key != "look"}
 
 
-class ForTraining(Developed):
-    """Exports to train with, which may have the views of several rigs."""
-
-    is_for_training = True
+class Joining(Export):
+    """Exports that may have the views of several rigs."""
 
     # Settings name the folders of these rigs, so this changes no file of an export either.
     together: Annotated[list[str], AfterValidator(unique_names)] | None = Field(
@@ -192,6 +190,12 @@ class ForTraining(Developed):
     @property
     def joined_rigs(self) -> list[str]:
         return self.together or []
+
+
+class ForTraining(Joining, Developed):
+    """Exports to train with, which may have the views of several rigs."""
+
+    is_for_training = True
 
 
 def angle(lens: Equidistant | KannalaBrandt) -> str:
