@@ -83,7 +83,6 @@ def figures_of(run_program, lightfield, calibration, output, *options):
         output,
         *options,
     )
-    assert run.returncode == 0, run.stderr
     return run.stdout, json.loads((output / "calibration.json").read_text())
 
 
@@ -155,7 +154,9 @@ def test_a_moved_principal_point_is_an_error_that_a_rotation_takes_away(
 def test_a_calibration_of_other_pictures_is_refused(tmp_path, run_program, lightfield):
     file = tmp_path / "cameras.txt"
     file.write_text("1 PINHOLE 640 480 300 300 320 240\n")
-    run = run_program("evaluate_calibration.py", lightfield(RECTILINEAR), "--calibration", file)
+    run = run_program(
+        "evaluate_calibration.py", lightfield(RECTILINEAR), "--calibration", file, check=False
+    )
     assert run.returncode == 1
     assert "cameras.txt" in run.stderr and "640 × 480" in run.stderr
     assert "240 × 180" in run.stderr and "Traceback" not in run.stderr

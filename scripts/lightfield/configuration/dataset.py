@@ -335,7 +335,7 @@ class Dataset(Capture):
 
     @property
     def published(self) -> list[str]:
-        """The light fields, corners, and the lists of exports, mesh and video. One job makes each."""
+        """The light fields, corners, and lists of exports, mesh and video. One job makes each."""
         lists = _present(self.corners, self.mesh_list, self.video_list)
         return [*self.lightfields, *self.exported, *lists]
 

@@ -90,7 +90,7 @@ class Board(Settings):
     rotation: Vector = Field(
         (0, 0, 0),
         description="Rotation of the board around its middle, as XYZ Euler angles. Without it, the "
-        "board faces up, and its upper edge is towards +y. With [90, 0, 0] it stands, and faces −y.",
+        "board faces up, and its upper edge is towards +y. With [90, 0, 0], it faces −y.",
         json_schema_extra={"unit": "degrees"},
     )
     border: float | None = Field(

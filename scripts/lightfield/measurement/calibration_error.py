@@ -64,11 +64,6 @@ def evaluate(job: EvaluateCalibration) -> None:
         model=settings.model,
         resolution=(true.width, true.height),
     )
-    if (calibrated.width, calibrated.height) != (true.width, true.height):
-        raise UserError(
-            f"{job.calibration}: is of {calibrated.width} × {calibrated.height} pixels, but "
-            f"{job.lightfield} of {true.width} × {true.height}; calibrate with its own pictures"
-        )
     as_calibrated, rotated = compare(true, calibrated)
     if not np.isfinite(as_calibrated.error).any():
         raise UserError(f"{job.calibration}: its lens sees no ray of {job.lightfield}")
