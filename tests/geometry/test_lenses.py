@@ -13,6 +13,7 @@ import cv2
 import forks
 import mpmath
 import numpy as np
+import pycolmap
 import pytest
 import yaml
 from conftest import BLENDER
@@ -29,16 +30,23 @@ from lightfield.geometry.lenses import (
     from_camera,
     from_lightfield,
 )
+from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
+from lightfield.geometry.lenses.division import Division
+from lightfield.geometry.lenses.double_sphere import DoubleSphere
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.equisolid import Equisolid
+from lightfield.geometry.lenses.extended_unified import ExtendedUnified
+from lightfield.geometry.lenses.f_theta import FTheta
+from lightfield.geometry.lenses.fov_model import FovModel
 from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.orthographic import Orthographic
 from lightfield.geometry.lenses.polynomial import Polynomial
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.lenses.stereographic import Stereographic
+from lightfield.geometry.lenses.unified import Unified
 
 BLENDER_POLYNOMIAL = (-1.17e-05, -0.0199887, -3.3525e-06, 3.09927e-06, -2.60646e-08)
 OPENCV = (-0.01, 0.03, -0.02, 0.003)
@@ -68,6 +76,24 @@ EXAMPLES: dict[str, Lens] = {
     "kannala_brandt shifted": KannalaBrandt(
         **SHIFTED, focal_length=11, coefficients=(0, 0, 0, 0), fov=math.radians(300)
     ),
+    "division": Division(**SIZE, focal_length=11, coefficients=(-0.35,)),
+    "division k > 0": Division(**SHIFTED, focal_length=30, coefficients=(0.2,)),
+    "division k = 0": Division(**SIZE, focal_length=18, coefficients=(0.0,)),
+    "fov_model": FovModel(**SIZE, focal_length=14, coefficients=(0.93,)),
+    "fov_model shifted": FovModel(**SHIFTED, focal_length=14, coefficients=(1e-6,)),
+    "unified": Unified(**SIZE, focal_length=20, coefficients=(0.9,)),
+    "unified xi > 1": Unified(**SHIFTED, focal_length=40, coefficients=(1.6,)),
+    "unified xi = 1": Unified(**SIZE, focal_length=12, coefficients=(1.0,), fov=5.5),
+    "extended_unified": ExtendedUnified(**SIZE, focal_length=9, coefficients=(0.628, 1.023)),
+    "extended_unified alpha < 0.5": ExtendedUnified(
+        **SHIFTED, focal_length=14, coefficients=(0.3, 4.0)
+    ),
+    "double_sphere": DoubleSphere(**SIZE, focal_length=9, coefficients=(-0.172, 0.593)),
+    "double_sphere alpha < 0.5": DoubleSphere(
+        **SHIFTED, focal_length=14, coefficients=(0.4, 0.3), fov=3.3
+    ),
+    "f_theta": FTheta(**SIZE, focal_length=11, coefficients=(0.01, -0.02, 0.003, -0.001)),
+    "f_theta shifted": FTheta(**SHIFTED, focal_length=11, coefficients=(0, 0.1, 0, 0), fov=3),
     "equirectangular": Equirectangular(**SIZE),
     "equirectangular part": Equirectangular(**SIZE, longitude=(-1, 2.5), latitude=(-0.5, 1.2)),
     "equirectangular part ahead": Equirectangular(**SIZE, longitude=(-1.2, 1.2)),
@@ -220,6 +246,47 @@ def test_kannala_brandt_is_opencvs_fisheye() -> None:
     rays = points * [1, -1, -1]
     np.testing.assert_allclose(lens.pixels(rays), expected[:, 0], atol=1e-9)
     assert angle(lens.rays(expected[:, 0, 0], expected[:, 0, 1]), rays).max() < 1e-12
+
+
+COLMAP = {
+    "division": ("DIVISION", Division, (-0.35,), 1.55, 170),
+    "division k > 0": ("DIVISION", Division, (0.2,), 0.84, 47.9),
+    "simple division": ("SIMPLE_DIVISION", Division, (-0.05,), 1.55, 120),
+    "fov_model": ("FOV", FovModel, (0.93,), 1.55, 89.9),
+    "fov_model narrow": ("FOV", FovModel, (2.5,), 1.55, 89.9),
+    "extended_unified": ("EUCM", ExtendedUnified, (0.628, 1.023), 1.55, 89.9),
+    "extended_unified alpha < 0.5": ("EUCM", ExtendedUnified, (0.3, 4.0), 1.55, 89.9),
+}
+
+
+@pytest.mark.parametrize("name", COLMAP)
+def test_lenses_of_colmap_have_its_pixels_and_rays(name: str) -> None:
+    model, lens_class, coefficients, inverted_to, degrees = COLMAP[name]
+    is_simple = model == "SIMPLE_DIVISION"
+    sensor = (36, 27 if is_simple else 30)
+    focal_lengths = [12 / sensor[0] * 640, 12 / sensor[1] * 480][: 1 if is_simple else 2]
+    lens = lens_class(
+        width=640,
+        height=480,
+        focal_length=12,
+        sensor_size=sensor,
+        principal_point=(310, 250),
+        coefficients=coefficients,
+    )
+    numbers = [*focal_lengths, 310, 250, *coefficients]
+    camera = pycolmap.Camera(model=model, width=640, height=480, params=numbers)
+    random = np.random.default_rng(4)
+    # Within 0.6° of the axis, COLMAP's FOV is a series, which is off by up to 2e-6 pixels.
+    theta, phi = np.radians(random.uniform(1, degrees, 1000)), random.uniform(-np.pi, np.pi, 1000)
+    # COLMAP's cameras look along +Z with +Y down, and its first pixel's centre is at 0.5.
+    points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], 1)
+    rays = points * [1, -1, -1]
+    expected = camera.img_from_cam(points * 3)
+    np.testing.assert_allclose(lens.pixels(rays), expected, rtol=1e-12, atol=1e-9)
+    # Where COLMAP's own inverse has the sign of z, it agrees, too.
+    seen = theta < inverted_to
+    back = camera.cam_ray_from_img(expected[seen]) * [1, -1, -1]
+    assert angle(lens.rays(*expected[seen].T), back).max() < 1e-10
 
 
 @pytest.mark.parametrize("name", [name for name in EXAMPLES if name.startswith("rectilinear")])
@@ -478,6 +545,44 @@ def test_kannala_brandt_ends_at_its_turning_point() -> None:
     assert np.isfinite(lens.rays(100 + scale * 0.6666, 100)).all()
     assert np.isnan(lens.rays(100 + scale * 0.6667, 100)).all()
     assert np.isnan(lens.pixels(np.array([math.sin(1.001), 0, -math.cos(1.001)]))).all()
+
+
+@pytest.mark.parametrize(
+    ("lens", "degrees", "radius"),
+    [
+        # r = θ − θ³ / 3 turns at 1 rad.
+        (KannalaBrandt(**LANDSCAPE, focal_length=9, coefficients=(-1 / 3, 0, 0, 0)), 57.3, 0.6667),
+        # r = θ − θ² / 4 turns at 2 rad.
+        (FTheta(**LANDSCAPE, focal_length=9, coefficients=(-0.25, 0, 0, 0)), 114.6, 1),
+        # tan θ = r / (1 + r²) is at most 1 / 2.
+        (Division(**LANDSCAPE, focal_length=9, coefficients=(1,)), 26.57, 1),
+        (FovModel(**LANDSCAPE, focal_length=9, coefficients=(math.pi / 2,)), 90, 1),
+        # cos θ = −1 / ξ, r = 1 / √(ξ² − 1).
+        (Unified(**LANDSCAPE, focal_length=9, coefficients=(1.25,)), 143.1, 4 / 3),
+        # The unit sphere, seen from infinity.
+        (ExtendedUnified(**LANDSCAPE, focal_length=9, coefficients=(1, 1)), 90, 1),
+        (DoubleSphere(**LANDSCAPE, focal_length=9, coefficients=(0, 1)), 90, 1),
+    ],
+    ids=lambda lens: getattr(lens, "name", ""),
+)
+def test_a_lens_that_ends_inside_its_image_says_where_and_how_much_has_no_ray(
+    lens: CalibratedLens, degrees: float, radius: float
+) -> None:
+    assert lens.clipped is not None
+    assert "\n" not in lens.clipped
+    assert f"the {lens.title} ends at {degrees:.4g}°, {radius:.4g} focal lengths" in lens.clipped
+    blank = np.isnan(lens.pixel_rays()).any(axis=-1).mean()
+    assert f"{100 * blank:.2g} % of the image has no ray" in lens.clipped
+    assert "fov" in lens.clipped
+    # A user's limit is no surprise. Neither is a frame inside the limit.
+    assert replace(lens, fov=2 * math.radians(degrees) - 0.01).clipped is None
+    assert replace(lens, fov=2 * math.radians(degrees) + 0.01).clipped == lens.clipped
+    assert replace(lens, focal_length=90).clipped is None
+
+
+def test_lenses_without_an_end_are_not_clipped() -> None:
+    for name in ("rectilinear", "equidistant 180°", "division", "unified xi = 1", "polynomial"):
+        assert EXAMPLES[name].clipped is None
 
 
 def test_hole_of_a_polynomial_lens() -> None:

@@ -147,7 +147,7 @@ class Export(Settings, ABC):
         """
 
 
-class Joined(Export):
+class Joining(Export):
     """Exports that may have the views of several rigs."""
 
     # Settings name the folders of these rigs, so this changes no file of an export either.
@@ -196,7 +196,7 @@ class Developed(Export):
         return {key: value for key, value in super().recorded.items() if key != "look"}
 
 
-class ForTraining(Joined, Developed):
+class ForTraining(Joining, Developed):
     """Exports to train with, which may have the views of several rigs."""
 
     is_for_training = True

@@ -198,6 +198,14 @@ class Lens(ABC):
         return _angle_along(across), _angle_along(down)
 
     @property
+    def clipped(self) -> str | None:
+        """What part of the image has no ray because the lens's equation ends, for people.
+
+        None if it has none for another reason, such as `fov`, and for lenses without such an end.
+        """
+        return None
+
+    @property
     def mirrors(self) -> tuple[bool, bool]:
         """Whether the lower half mirrors the upper half, and the right half the left half."""
         return False, False
