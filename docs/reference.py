@@ -37,7 +37,7 @@ from lightfield.core.units import limit
 from lightfield.exporters import EXPORTERS, SEQUENCE_EXPORTS, Exports
 from lightfield.exporters.base import Developed, Export, ForTraining
 from lightfield.formats import render_block, sensors
-from lightfield.geometry import rigs
+from lightfield.geometry import inertia, rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import mount, path, rig, split_setting
@@ -186,6 +186,7 @@ KEY_PAGES: dict[str, Page] = {
         [
             *[Section(_literal(model, "type"), model, rig.Rig) for model in RIG_MODELS],
             Section("A key of a path", path.Key),
+            Section("The imu of a path", inertia.Imu),
         ],
     ),
     "camera-keys.md": Page(

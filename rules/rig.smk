@@ -50,6 +50,7 @@ rule lightfield:
     output:
         lightfield=update(RUN.paths.lightfield),
         receipt=PLAN.receipt_of(LIGHTFIELD),
+        bundle=PLAN.bundle_of(LIGHTFIELD),
     log:
         RUN.log_of(LIGHTFIELD),
     benchmark:

@@ -433,6 +433,32 @@ REFUSED = [
         )
     ),
     *(
+        (
+            "rigs.A",
+            {
+                "type": "path",
+                "camera": CAMERA,
+                "count": 4,
+                "keys": [{"position": [0, 0, 1]}, {"position": [0, 1, 1]}],
+                "imu": value,
+            },
+            "rigs.A.imu",
+        )
+        for value in (
+            True,
+            {},
+            {"seconds": 0},
+            {"seconds": 1e7},
+            {"seconds": 1, "rate": 0},
+            {"seconds": 1, "rate": 1e6},
+            {"seconds": 1e5},
+            {"seconds": 1, "seed": -1},
+            {"seconds": 1, "exposure": 0},
+            {"seconds": 1, "gyroscope_noise_density": -1},
+            {"seconds": 1, "accelerometer_random_walk": 1e4},
+        )
+    ),
+    *(
         ("reprojections.perspective.camera", {"resolution": [8, 8], "lens": lens, **keys})
         for lens, keys in (
             ("pinhole", {"fov": 60}),
@@ -871,11 +897,6 @@ EXPLAINED = [
         "rigs.LFSphere.camera",
         {"lens": "equidistant", "resolution": [9, 9]},
         "rigs.LFSphere.camera: is missing the key fov",
-    ),
-    (
-        "rigs.LFSphere.camera",
-        {"lens": "stereographic", "fov": 180, "resolution": [9, 9]},
-        "rigs.LFSphere.camera.lens: is 'stereographic', which Cycles does not have",
     ),
     ("render.depth", "z", "render.depth: is 'z', but rigs.LFCuboid.camera"),
     (

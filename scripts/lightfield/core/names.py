@@ -12,6 +12,9 @@ RENDERED = "render"
 MESH = "mesh"
 # The folder of a dataset with its turntable or walk.
 VIDEO = "video"
+# The folder of a dataset with the files of an inertial sensor (IMU), and the key of its settings in
+# lightfield.json.
+IMU = "imu"
 
 # The file that lists which of a scene's views are in which part of the split.
 SPLITS = "splits.json"

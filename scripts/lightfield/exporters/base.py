@@ -147,7 +147,7 @@ class Export(Settings, ABC):
         """
 
 
-class Joining(Export):
+class Joined(Export):
     """Exports that may have the views of several rigs."""
 
     # Settings name the folders of these rigs, so this changes no file of an export either.
@@ -196,7 +196,7 @@ class Developed(Export):
         return {key: value for key, value in super().recorded.items() if key != "look"}
 
 
-class ForTraining(Joining, Developed):
+class ForTraining(Joined, Developed):
     """Exports to train with, which may have the views of several rigs."""
 
     is_for_training = True

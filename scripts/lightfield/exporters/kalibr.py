@@ -18,7 +18,7 @@ import numpy as np
 from lightfield.core.files import write_text
 from lightfield.export import cameras, heads
 from lightfield.export.source import SourceDataset
-from lightfield.exporters.base import TO_RECTILINEAR, Joining, angle
+from lightfield.exporters.base import TO_RECTILINEAR, Joined, angle
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
@@ -29,7 +29,7 @@ from lightfield.geometry.rigs import Rig
 _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
-class Kalibr(Joining):
+class Kalibr(Joined):
     """Kalibr's calibration of one camera or of a head."""
 
     name = "kalibr"

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from lightfield.core.files import read_bytes, write_text
-from lightfield.core.names import READER
+from lightfield.core.names import IMU, READER
 from lightfield.core.paths import inside
 from lightfield.formats.lightfield import NAME, LightField
 from lightfield.formats.passes import FLOW, NAMES, Pass
@@ -41,6 +41,9 @@ CARD = "card.json"
 WALK = "walk.html"
 PACKAGED = (README, CARD, READER, WALK)
 """The files that a package adds to a dataset."""
+
+IMU_FILES = (f"{IMU}/imu.csv", f"{IMU}/groundtruth.csv", f"{IMU}/views.csv")
+"""The files of an inertial sensor: what it measures, the true motion, and the views' times."""
 
 DEPTH_PICTURE = "{view}_depth.png"
 """The picture that scripts/reproject.py puts beside a view with --depth-png."""
@@ -227,11 +230,13 @@ def expected_pass_files(sets: Sequence[ImageSet]) -> list[File]:
     return files
 
 
-def json_files(sets: Sequence[ImageSet]) -> list[str]:
-    """Return the paths of the JSON files beside images: names of ids, and sensors' parameters."""
+def side_files(sets: Sequence[ImageSet]) -> list[str]:
+    """Return the paths of the files beside images: names of ids, parameters, inertial sensors."""
     rendered_set = rendered(sets)
     passes = rendered_set.lightfield.passes if rendered_set else []
     paths = [f"{view_pass.name}/{NAMES}" for view_pass in passes if view_pass.kind == "id"]
+    if rendered_set and IMU in rendered_set.lightfield.content:
+        paths += IMU_FILES
     for image_set in sets:
         if image_set.sensor:
             paths += [f"{image_set.folder}/{parameter_file(view)}" for view in image_set.views]

@@ -10,6 +10,7 @@ SILVR's tools wrote have these alone, and are read, too. Ours are:
 - ``head``: the head that the camera belongs to, and where it sits on the head's body.
 - ``passes``: which of the passes in ``render`` a reprojection has.
 - ``split`` of a frame: what the view is for.
+- ``imu``: the inertial sensor whose files lie beside it.
 - ``flow`` of a frame: the view to which its flow leads.
 - ``exposure`` of a frame: the camera-to-world matrices at the ``start`` and the ``end`` of the
   exposure of a moving camera. ``world_matrix`` is the matrix in its middle.

@@ -179,6 +179,7 @@ LIGHTFIELD = Job(
     fields.lightfield,
     times="{scene}/{rig}/cameras/lightfield",
     file=lambda paths: paths.lightfield,
+    has_bundle=True,
     is_local=True,
 )
 CHECK_CAMERAS = Job(
