@@ -37,7 +37,7 @@ from lightfield.core.units import limit
 from lightfield.exporters import EXPORTERS, SEQUENCE_EXPORTS, Exports
 from lightfield.exporters.base import Developed, Export, ForTraining
 from lightfield.formats import render_block, sensors
-from lightfield.geometry import inertia, rigs
+from lightfield.geometry import boards, inertia, rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import mount, path, rig, split_setting
@@ -134,6 +134,11 @@ KEY_PAGES: dict[str, Page] = {
             Section("scene", scene_source.SceneSource, scene_source.ModelOptions),
             Section("scene: of a model", scene_source.ModelOptions),
             Section("scene: parameters", scene_source.Parameters),
+            Section("scene: targets: all boards", boards.Board),
+            *[
+                Section(f"scene: targets: {_literal(model, 'type')}", model, boards.Board)
+                for model in _models(boards.AnyBoard)
+            ],
             Section("flow", scene_blocks.Flow),
             Section("mesh", scene_blocks.MeshFiles),
             Section("video", scene_blocks.Video),
@@ -244,7 +249,7 @@ KEY_PAGES: dict[str, Page] = {
 PROGRAM_GROUPS = {
     "Prepare a scene": [
         "new_scene", "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
-        "make_lightfield", "free_places", "check_cameras", "import_views",
+        "make_lightfield", "free_places", "check_cameras", "corners", "import_views",
     ],
     "Build a family": ["build_members", "corpus", "count_members", "prune"],
     "Render": ["check_device", "probe", "calibrate", "render_shard"],
@@ -266,7 +271,8 @@ PROGRAM_GROUPS = {
         "schema",
     ],
     "Measure": [
-        "evaluate", "evaluate_surface", "synthesis_quality", "error_vs_time", "plan", "gpu_check",
+        "evaluate", "evaluate_surface", "evaluate_calibration", "synthesis_quality",
+        "error_vs_time", "plan", "gpu_check",
     ],
 }  # fmt: skip
 

@@ -49,6 +49,10 @@ PUBLISH = {
     "social_impact": "None.",
 }
 
+CHESSBOARD = {"type": "chessboard", "squares": [5, 4], "square": 0.04}
+CHARUCO = {"type": "charuco", "squares": [5, 4], "square": 0.04, "marker": 0.03}
+APRILGRID = {"type": "aprilgrid", "tags": [4, 3], "tag": 0.06}
+
 # Instead of a value: removes the key. Its text is the same in all processes of the tests.
 REMOVE = ...
 
@@ -310,6 +314,35 @@ REFUSED = [
     ("exports.scene_flow", {"sources": ["perspective"]}, "exports.scene_flow.sources: perspective"),
     ("exports.coco", {"sources": ["views"]}, "exports.coco.sources: views lacks the pass object"),
     *(("mesh", value) for value in (None, True, "glb", [])),
+    *(("scene.targets", value) for value in (None, True, [], {"a": {}}, {"a/b": CHESSBOARD})),
+    *(
+        ("scene.targets", {"a": CHESSBOARD | {key: value}}, f"scene.targets.a.{key}")
+        for key, value in (
+            ("type", "circles"),
+            ("squares", [1, 4]),
+            ("squares", 4),
+            ("squares", [51, 4]),
+            ("square", 0),
+            ("border", -1),
+            ("position", [0, 0]),
+            ("rotation", 90),
+            ("marker", 0.02),
+        )
+    ),
+    *(
+        ("scene.targets", {"a": CHARUCO | {key: value}}, f"scene.targets.a.{key}")
+        for key, value in (("marker", 0.04), ("dictionary", "DICT_5x5_250"))
+    ),
+    *(
+        ("scene.targets", {"a": APRILGRID | {key: value}}, f"scene.targets.a.{key}")
+        for key, value in (
+            ("tags", [50, 50]),
+            ("tag", 0),
+            ("spacing", 0),
+            ("border_bits", 3),
+            ("dictionary", "DICT_5X5_250"),
+        )
+    ),
     *(("mesh.formats", value) for value in ([], ["obj"], "glb", ["glb", "glb"], ["GLB"])),
     *(("video", value) for value in (None, True, "mp4", {}, {"path": "orbit"})),
     *(

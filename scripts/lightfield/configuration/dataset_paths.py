@@ -7,6 +7,7 @@ from lightfield.core.names import HEADS, MESH, SEQUENCE_PAGE, SPLITS, VIDEO, VIE
 from lightfield.engine.receipts import FOLDER, SUFFIX
 from lightfield.exporters import list_path
 from lightfield.formats.export_lists import MANIFEST
+from lightfield.formats.layout import CORNERS
 
 # The pictures of a report.
 PICTURES = ("overview", "contact_sheet", "rig", "depth", "noise")
@@ -133,6 +134,11 @@ class Paths:
     def cameras(self) -> str:
         """The report on the cameras: the space around each of them."""
         return f"{self.work}/cameras.json"
+
+    @property
+    def corners(self) -> str:
+        """The corners of the calibration boards in each view."""
+        return f"{self.folder}/{CORNERS}"
 
     @property
     def probe(self) -> str:

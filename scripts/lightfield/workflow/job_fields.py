@@ -88,6 +88,18 @@ def check_cameras(dataset: Dataset) -> Fields | None:
     }
 
 
+@_of_dataset
+def corners(dataset: Dataset) -> Fields | None:
+    if dataset.corners is None:
+        return None
+    return {
+        "blend": dataset.blend,
+        "lightfield": dataset.paths.lightfield,
+        "inventory": dataset.blend_inventory,
+        "output": dataset.corners,
+    }
+
+
 def splits(build: Build, wildcards: Wildcards) -> Fields | None:
     lightfields = build.split_lightfields(wildcards)
     if not lightfields:

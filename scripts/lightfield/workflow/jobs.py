@@ -190,6 +190,15 @@ CHECK_CAMERAS = Job(
     fields=fields.check_cameras,
     times="{scene}/{rig}/cameras/check_cameras",
 )
+CORNERS = Job(
+    "{scene}/{rig}/corners",
+    rig.FindCorners,
+    "cameras",
+    _costs(BLENDER),
+    fields=fields.corners,
+    times="{scene}/{rig}/cameras/corners",
+    file=lambda paths: paths.corners,
+)
 PROBE_CAMERAS = Job(
     "{scene}/probe_cameras",
     rig.MakeLightfield,
