@@ -28,7 +28,7 @@ description: Cameras in a room
 scene:
   builder: room
   frame: 1
-  targets: {board: {type: chessboard, squares: [4, 3], square: 0.04}}
+  targets: {{board: {{type: chessboard, squares: [4, 3], square: 0.04}}}}
 render: {{samples: 4}}
 report: {{panorama: true}}
 rigs:
