@@ -37,10 +37,10 @@ from lightfield.core.units import limit
 from lightfield.exporters import EXPORTERS, SEQUENCE_EXPORTS, Exports
 from lightfield.exporters.base import Developed, Export, ForTraining
 from lightfield.formats import render_block, sensors
-from lightfield.geometry import boards, rigs
+from lightfield.geometry import boards, inertia, rigs
 from lightfield.geometry.lenses import LENSES
 from lightfield.geometry.lenses.rectilinear import FileSettings
-from lightfield.geometry.rigs import path, rig, split_setting
+from lightfield.geometry.rigs import mount, path, rig, split_setting
 from lightfield.settings.base import MEANINGS
 
 PROGRAMS = ROOT / "scripts"
@@ -177,6 +177,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("All rigs", rig.Rig),
             Section("frames", rig.Frames),
             Section("stereo", rig.Stereo),
+            Section("A camera of a head", mount.HeadCamera),
             Section("split", split_setting.Chosen),
         ],
     ),
@@ -190,6 +191,7 @@ KEY_PAGES: dict[str, Page] = {
         [
             *[Section(_literal(model, "type"), model, rig.Rig) for model in RIG_MODELS],
             Section("A key of a path", path.Key),
+            Section("The imu of a path", inertia.Imu),
         ],
     ),
     "camera-keys.md": Page(
@@ -252,7 +254,16 @@ PROGRAM_GROUPS = {
     "Build a family": ["build_members", "corpus", "count_members", "prune"],
     "Render": ["check_device", "probe", "calibrate", "render_shard"],
     "Reproject": ["lens_map", "reproject"],
-    "Export": ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize", "video"],
+    "Export": [
+        "flow",
+        "surface",
+        "splits",
+        "heads",
+        "export",
+        "export_instant_ngp",
+        "synthesize",
+        "video",
+    ],
     "Publish and fetch": ["publish_checksums", "package", "publish", "take_dataset"],
     "Check": ["validate", "validate_sequence", "verify", "diff", "status"],
     "Report": [

@@ -222,6 +222,11 @@ class Dataset(Capture):
         return self.paths.splits if self.rig.split else None
 
     @property
+    def heads(self) -> str | None:
+        """The list of the scene's heads, if this rig is a camera of one."""
+        return self.paths.heads if self.rig.mount else None
+
+    @property
     def mesh_list(self) -> str | None:
         return self.paths.mesh_list if self.mesh else None
 
@@ -350,7 +355,7 @@ class Dataset(Capture):
         return [
             paths.validation,
             paths.sums,
-            *_present(self.splits),
+            *_present(self.splits, self.heads),
             *self.published,
             *self.sequence_exports,
             *_present(self.sequence_sums),

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
-from lightfield.core.names import MESH, SEQUENCE_PAGE, SPLITS, VIDEO, VIEWS
+from lightfield.core.names import HEADS, MESH, SEQUENCE_PAGE, SPLITS, VIDEO, VIEWS
 from lightfield.engine.receipts import FOLDER, SUFFIX
 from lightfield.exporters import list_path
 from lightfield.formats.export_lists import MANIFEST
@@ -96,6 +96,11 @@ class Paths:
     def splits(self) -> str:
         """The list of the views that train, validate and test."""
         return f"{self.scene_results}/{SPLITS}"
+
+    @property
+    def heads(self) -> str:
+        """The list of the scene's heads: cameras on one body, and what they take at each place."""
+        return f"{self.scene_results}/{HEADS}"
 
     # Files of a rig.
 

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from lightfield.core.files import read_bytes, write_text
-from lightfield.core.names import READER
+from lightfield.core.names import IMU, READER
 from lightfield.core.paths import inside
 from lightfield.formats.lightfield import NAME, OMNIDIRECTIONAL, LightField
 from lightfield.formats.passes import FLOW, NAMES, Pass
@@ -44,6 +44,9 @@ CARD = "card.json"
 WALK = "walk.html"
 PACKAGED = (README, CARD, READER, WALK)
 """The files that a package adds to a dataset."""
+
+IMU_FILES = (f"{IMU}/imu.csv", f"{IMU}/groundtruth.csv", f"{IMU}/views.csv")
+"""The files of an inertial sensor: what it measures, the true motion, and the views' times."""
 
 DEPTH_PICTURE = "{view}_depth.png"
 """The picture that scripts/reproject.py puts beside a view with --depth-png."""
@@ -230,11 +233,13 @@ def expected_pass_files(sets: Sequence[ImageSet]) -> list[File]:
     return files
 
 
-def json_files(sets: Sequence[ImageSet]) -> list[str]:
-    """Return the paths of the JSON files beside images: corners, names, and sensors' parameters."""
+def side_files(sets: Sequence[ImageSet]) -> list[str]:
+    """Return the paths of the files beside images: names, parameters, corners, inertial sensors."""
     rendered_set = rendered(sets)
     passes = rendered_set.lightfield.passes if rendered_set else []
     paths = [f"{view_pass.name}/{NAMES}" for view_pass in passes if view_pass.kind == "id"]
+    if rendered_set and IMU in rendered_set.lightfield.content:
+        paths += IMU_FILES
     if rendered_set and has_corners(rendered_set.lightfield):
         paths.append(CORNERS)
     for image_set in sets:

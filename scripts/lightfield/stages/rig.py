@@ -1,13 +1,13 @@
 """The stages that place a rig's cameras, check them, and write the light field."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainSerializer
 
 from lightfield.configuration.capture import LightfieldSettings
-from lightfield.core.names import FILE, INVENTORY
+from lightfield.core.names import FILE, IMU, INVENTORY
 from lightfield.engine.stage import ByHand, PlainStage, Stage, option, reads, writes
 from lightfield.geometry.boards import Boards
 from lightfield.geometry.rigs import Random, as_written
@@ -81,6 +81,10 @@ class MakeLightfield(Stage[LightfieldSettings]):
     model: Path | None = reads("JSON that scripts/import_model.py wrote, for a model", None)
     places: Path | None = reads("JSON that scripts/free_places.py wrote, for a random rig", None)
     output: Path = writes("lightfield.json to write")
+
+    def made(self) -> Iterator[Path]:
+        yield from super().made()
+        yield self.output.with_name(IMU)
 
 
 class FindCorners(PlainStage):

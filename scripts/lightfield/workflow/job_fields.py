@@ -108,6 +108,14 @@ def splits(build: Build, wildcards: Wildcards) -> Fields | None:
     return {"lightfields": lightfields, "output": paths.splits}
 
 
+def heads(build: Build, wildcards: Wildcards) -> Fields | None:
+    lightfields = build.head_lightfields(wildcards)
+    if not lightfields:
+        return None
+    paths = Paths(build.config.results, build.config.work, wildcards["scene"])
+    return {"lightfields": lightfields, "output": paths.heads}
+
+
 def render(build: Build, wildcards: Wildcards) -> Fields | None:
     dataset = build.dataset(wildcards)
     if dataset.imported:

@@ -28,6 +28,7 @@ from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIDEO, VIEWS
 from lightfield.exporters import export_settings_of
 from lightfield.exporters.base import Export, ExportSettings
+from lightfield.geometry import rigs
 from lightfield.geometry.rigs import Poses
 from lightfield.imaging import blender_looks
 from lightfield.planning.loading import datasets_of, rendered_frames
@@ -432,8 +433,12 @@ def sequence_page(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
 
 
 def probes(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
-    """Return the settings of a scene's probe cameras. They are its first rig's settings."""
-    return "probes", lightfield(build.first_of_scene(wildcards["scene"]))
+    """Return the settings of a scene's probe cameras. They are its first rig's, without an imu."""
+    settings = lightfield(build.first_of_scene(wildcards["scene"]))
+    if isinstance(settings.rig, rigs.Path):
+        rig = settings.rig.model_copy(update={"imu": None})
+        settings = settings.model_copy(update={"rig": rig})
+    return "probes", settings
 
 
 def gpu_check(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:

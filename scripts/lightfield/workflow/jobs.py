@@ -179,6 +179,7 @@ LIGHTFIELD = Job(
     fields.lightfield,
     times="{scene}/{rig}/cameras/lightfield",
     file=lambda paths: paths.lightfield,
+    has_bundle=True,
     is_local=True,
 )
 CHECK_CAMERAS = Job(
@@ -265,6 +266,14 @@ SPLITS = Job(
     "cameras",
     _costs(JOB),
     fields=fields.splits,
+    is_local=True,
+)
+HEADS = Job(
+    "{scene}/heads",
+    views.ListHeads,
+    "cameras",
+    _costs(JOB),
+    fields=fields.heads,
     is_local=True,
 )
 EXPORT = Job(
