@@ -234,14 +234,14 @@ def expected_pass_files(sets: Sequence[ImageSet]) -> list[File]:
 
 
 def side_files(sets: Sequence[ImageSet]) -> list[str]:
-    """Return the paths of the files beside images: names, parameters, corners, inertial sensors."""
+    """Return the paths of the files beside images: corners, names, parameters, inertial sensors."""
     rendered_set = rendered(sets)
     passes = rendered_set.lightfield.passes if rendered_set else []
     paths = [f"{view_pass.name}/{NAMES}" for view_pass in passes if view_pass.kind == "id"]
-    if rendered_set and IMU in rendered_set.lightfield.content:
-        paths += IMU_FILES
     if rendered_set and has_corners(rendered_set.lightfield):
         paths.append(CORNERS)
+    if rendered_set and IMU in rendered_set.lightfield.content:
+        paths += IMU_FILES
     for image_set in sets:
         if image_set.sensor:
             paths += [f"{image_set.folder}/{parameter_file(view)}" for view in image_set.views]
