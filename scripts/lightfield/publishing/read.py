@@ -14,6 +14,7 @@ import json
 import re
 import tarfile
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,20 @@ def open_views(reprojection: str = "", folder: Any = Path(__file__).parent) -> "
     if not views:
         raise ValueError(f"{folder}: has no views {reprojection!r}; it has {sorted(names)}")
     return [views[place] for place in sorted(views)]
+
+
+sin, cos, tan = np.sin, np.cos, np.tan
+# The lenses of calibrated cameras: r in focal lengths, at an angle t from the axis. k are the
+# coefficients.
+CALIBRATED: Any = {
+    "kannala_brandt": lambda k, t: t * np.polynomial.Polynomial([1, *k])(t * t),
+    "f_theta": lambda k, t: t * np.polynomial.Polynomial([1, *k])(t),
+    "division": lambda k, t: 2 * sin(t) / (cos(t) + (cos(t) ** 2 - 4 * k[0] * sin(t) ** 2) ** 0.5),
+    "fov_model": lambda k, t: np.arctan(2 * tan(k[0] / 2) * tan(t)) / k[0],
+    "unified": lambda k, t: sin(t) / (cos(t) + k[0]),
+    "extended_unified": lambda k, t: sin(t) / mixed(k[0], k[1] ** 0.5 * sin(t), cos(t)),
+    "double_sphere": lambda k, t: sin(t) / mixed(k[1], sin(t), k[0] + cos(t)),
+}
 
 
 class PlainView:
@@ -116,23 +131,24 @@ class PlainLens:
         self.unit = pixel / length if length else 2 / self.size  # The image circle has radius 1.
         # The largest angle θ from the axis. Then θ of r = |(u, v)|, and r of θ, for each lens.
         self.end = end = min(camera.get("fisheye_fov", np.pi) / 2, np.pi)
-        sin, tan = np.sin(end), np.tan(end / 2)
+        side, half = sin(end), tan(end / 2)
         curves: Any = {
             "EQUIRECTANGULAR": (None, None),
-            "PERSP": (np.arctan, np.tan),
+            "PERSP": (np.arctan, tan),
             "EQUIDISTANT": (lambda r: r * end, lambda t: t / end),
-            "EQUISOLID": (lambda r: 2 * np.arcsin(r / 2), lambda t: 2 * np.sin(t / 2)),
-            "ORTHOGRAPHIC": (lambda r: np.arcsin(r * sin), lambda t: np.sin(t) / sin),
-            "STEREOGRAPHIC": (lambda r: 2 * np.arctan(r * tan), lambda t: np.tan(t / 2) / tan),
+            "EQUISOLID": (lambda r: 2 * np.arcsin(r / 2), lambda t: 2 * sin(t / 2)),
+            "ORTHOGRAPHIC": (lambda r: np.arcsin(r * side), lambda t: sin(t) / side),
+            "STEREOGRAPHIC": (lambda r: 2 * np.arctan(r * half), lambda t: tan(t / 2) / half),
         }
         if self.kind == "EQUIRECTANGULAR":
             west, north = camera["longitude_min"], camera["latitude_max"]
             self.unit = (camera["longitude_max"] - west, north - camera["latitude_min"]) / self.size
             self.center = (-west, north) / self.unit
-        elif self.kind == "KANNALA_BRANDT":
-            p = np.polynomial.Polynomial(np.insert([1, *camera["kannala_brandt"]], range(5), 0))
-            self.end = end = min(end, first_root(p.deriv()))
-            curves[self.kind] = lambda r: inverse(p, end, 0, r), p
+        elif name := next((name for name in CALIBRATED if name in camera), None):
+            # r in focal lengths, up to where it stops growing with θ.
+            curve = partial(CALIBRATED[name], camera[name])
+            self.end = end = rim(curve, end)
+            curves[self.kind] = lambda r: inverse(curve, end, 0, r), curve
         elif self.kind == "LENS_POLYNOMIAL":
             k = np.array([camera[f"fisheye_polynomial_k{i}"] for i in range(5)])
             sign = -np.sign(k[1:][k[1:] != 0][0])
@@ -147,17 +163,19 @@ class PlainLens:
         """Return the unit rays (height, width, 3) of all pixels' centres."""
         return self.rays(*np.meshgrid(*(np.arange(side) + 0.5 for side in self.size)))
 
+    @np.errstate(divide="ignore", invalid="ignore")
     def rays(self, x: Any, y: Any) -> Any:
         """Return the unit rays (..., 3) of pixel coordinates. NaN where the lens has none."""
         u, v = (x - self.center[0]) * self.unit[0], (self.center[1] - y) * self.unit[1]
         if self.kind == "EQUIRECTANGULAR":
             v = np.where(np.abs(v) <= np.pi / 2 + 1e-6, v, np.nan)
-            return np.stack([np.cos(v) * np.sin(u), np.sin(v), -np.cos(v) * np.cos(u)], axis=-1)
+            return np.stack([cos(v) * sin(u), sin(v), -cos(v) * cos(u)], axis=-1)
         r, azimuth, last = np.hypot(u, v), np.arctan2(u, v), np.abs(self.radius(self.end))
         theta = np.where(r <= last * (1 + 1e-14), self.theta(np.minimum(r, last)), np.nan)
-        right, up = np.sin(theta) * [np.sin(azimuth), np.cos(azimuth)]
-        return np.stack([right, up, -np.cos(theta)], axis=-1)
+        right, up = sin(theta) * [sin(azimuth), cos(azimuth)]
+        return np.stack([right, up, -cos(theta)], axis=-1)
 
+    @np.errstate(divide="ignore", invalid="ignore")
     def pixels(self, rays: Any) -> Any:
         """Return the pixel coordinates (..., 2) of rays (..., 3). NaN if the lens sees none."""
         x, y, z = np.moveaxis(rays, -1, 0)
@@ -168,7 +186,7 @@ class PlainLens:
         else:
             theta = np.arctan2(np.hypot(x, y), -z)
             r = np.where(theta <= self.end * (1 + 1e-14), self.radius(theta), np.nan)
-            u, v = r * [np.sin(np.arctan2(x, y)), np.cos(np.arctan2(x, y))]
+            u, v = r * [sin(np.arctan2(x, y)), cos(np.arctan2(x, y))]
         return self.center + np.stack([u, -v], axis=-1) / self.unit
 
 
@@ -178,11 +196,39 @@ def first_root(polynomial: Any) -> Any:
     return min([root.real for root in roots if root.real > 0], default=np.inf)
 
 
-def inverse(polynomial: Any, last: float, least: float, values: Any) -> Any:
-    """Return t from 0 to ``last`` with the values of a polynomial that grows, by bisection."""
-    t = np.zeros(np.shape(values))
-    for step in last / 2.0 ** np.arange(1, 60):
-        t += np.where(polynomial(t + step) < values, step, 0)
+def mixed(alpha: float, across: Any, along: Any) -> Any:
+    """Return the divisor of a projection between the one from a sphere and the perspective one."""
+    return alpha * np.hypot(across, along) + (1 - alpha) * along
+
+
+@np.errstate(divide="ignore", invalid="ignore")
+def rim(curve: Any, last: float) -> float:
+    """Return the angle, up to ``last``, at which a lens's r stops growing, or becomes infinite."""
+    t = np.linspace(0, last, 4097)
+    falls = np.flatnonzero(~(np.diff(curve(t)) > 0) | (curve(t[1:]) < 0))
+    low, high = (t[max(falls[0] - 1, 0)], t[falls[0] + 1]) if falls.size else (last, last)
+    for _ in range(100):
+        near, far = low + (high - low) / 3, high - (high - low) / 3
+        low, high = (near, high) if 0 < curve(near) < curve(far) else (low, far)
+    return float(low)
+
+
+@np.errstate(divide="ignore", invalid="ignore")
+def inverse(curve: Any, last: float, least: float, values: Any) -> Any:
+    """Return t from 0 to ``last`` with the values of a curve that grows. The Illinois method."""
+    goal, t = np.arctan(values), np.linspace(0, last, 4097)  # The angle is finite for infinite r.
+    known = np.arctan(curve(t))
+    upper = np.clip(np.searchsorted(known, goal), 1, 4096)
+    low, high, below, above = t[upper - 1], t[upper], known[upper - 1] - goal, known[upper] - goal
+    sides: Any = (False, False)
+    for _ in range(16):
+        t = np.clip(high - (high - low) * (above / np.maximum(above - below, 1e-300)), low, high)
+        error = np.arctan(curve(t)) - goal
+        sides = error < 0, error >= 0, *sides[:2]
+        # An end that stays a second time counts half.
+        below = np.where(sides[0], error, np.where(sides[-1], below / 2, below))
+        above = np.where(sides[1], error, np.where(sides[-2], above / 2, above))
+        low, high = np.where(sides[0], t, low), np.where(sides[1], t, high)
     return np.where(values >= least, t, np.nan)
 
 

@@ -366,7 +366,7 @@ class RadialLens(Lens):
         v = (self.center[1] - y) * self._unit[1]
         u, v = self._unbent(u, v)
         r = np.hypot(u, v)
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             sin, cos = self._sin_cos(r)
             # One plane after the other: numpy fills these much faster than vectors.
             ray = np.stack([sin * (u / r), sin * (v / r), -cos])

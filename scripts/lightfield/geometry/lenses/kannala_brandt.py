@@ -35,7 +35,7 @@ class KannalaBrandt(PolynomialOfAngle):
     Settings = KannalaBrandtSettings
 
     @property
-    def _terms(self) -> list[float]:
+    def _polynomial(self) -> list[float]:
         # θ + k1 θ³ + k2 θ⁵ + …: the even powers of θ have no coefficient.
         terms = np.zeros(10)
         terms[1::2] = (1.0, *self.coefficients)
