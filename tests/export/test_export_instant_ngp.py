@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
+from sphere import look_at_ball, write_views
 
 from lightfield.core.errors import UserError
 from lightfield.engine.flags import parsed
+from lightfield.export.source import SourceDataset
 from lightfield.exporters import instant_ngp
 from lightfield.exporters.base import ExportSettings
 from lightfield.exporters.instant_ngp import InstantNgp, TransformsByHand
-from lightfield.formats.lightfield import LightField
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.geometry.depth import in_16_bits
 from lightfield.imaging import images
+from lightfield.products import exports
 
 RIG: dict[str, Any] = {
     "type": "cylinder",
@@ -277,6 +280,58 @@ def test_empty_pixels_of_transparent_views_are_not_hidden(dataset: Dataset) -> N
     copied = images.read_image(dataset.folder / transforms["frames"][0]["file_path"]).channels
     assert copied.keys() == set("RGBA")
     np.testing.assert_array_equal(copied["A"], half)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
+def test_views_of_two_rigs_go_into_one_list_beside_the_first_rigs_views(
+    tmp_path: Path, suffix: str
+) -> None:
+    rigs = {"near": RIG, "far": RIG | {"center": [0.2, 0.4, -0.3], "split": {"every": 3}}}
+    for name, rig in rigs.items():
+        write_views(tmp_path / name / "small", FISHEYE, rig, suffix, look_at_ball)
+    options = InstantNgp(sources=["small"], together=["near", "far"], depth=suffix == ".exr")
+    source = SourceDataset(tmp_path / "near", "small", suffix, {"far": tmp_path / "far"})
+    exports.run(source, options, tmp_path / "near/small")
+    # A package has only the first rig's folder.
+    (tmp_path / "near/small").rename(tmp_path / "package")
+    near, far = (
+        {view.name: (folder / f"{view.name}{suffix}", view) for view in _views(folder)}
+        for folder in (tmp_path / "package", tmp_path / "far/small")
+    )
+    expected = near | {f"far_{name}": view for name, view in far.items()}
+
+    package = Dataset(tmp_path / "package")
+    transforms = package.read("transforms.json")
+    assert _names(transforms) == [*expected]
+    loader = Loader(transforms)
+    cosine = -lenses.from_camera(FISHEYE).pixel_rays()[..., 2]
+    has_ray = np.isfinite(cosine)
+    for number, (path, view) in enumerate(expected.values()):
+        frame = transforms["frames"][number]
+        true = images.read_image(path).channels
+        picture = package.folder / frame["file_path"]
+        seen = images.read_image(picture).channels
+        np.testing.assert_array_equal(seen["G"][has_ray], true["G"][has_ray])
+        place = loader.position(silvr_orientation(view.position))
+        np.testing.assert_allclose(loader.camera(number)[1], place, atol=1e-6)
+        if suffix == ".png":
+            mask = images.read_image(picture.with_name(f"dynamic_mask_{picture.stem}.png"))
+            np.testing.assert_array_equal(mask.channels["Y"] == 255, ~has_ray)
+        else:
+            steps = images.read_image(package.folder / frame["depth_path"]).channels["Y"]
+            z = steps * transforms["integer_depth_scale"] * cosine
+            np.testing.assert_allclose(z[has_ray], true["Z"][has_ray], atol=0.001)
+    for part in ("train", "test"):
+        in_part = [name for name, (_, view) in expected.items() if view.split == part]
+        assert _names(package.read(f"transforms_{part}.json")) == in_part
+
+
+def _views(folder: Path) -> list[View]:
+    return LightField.read(folder / "lightfield.json").views
+
+
+def _names(transforms: dict[str, Any]) -> list[str]:
+    return [Path(frame["file_path"]).stem for frame in transforms["frames"]]
 
 
 def test_missing_images_are_a_warning(dataset: Dataset, capsys: pytest.CaptureFixture[str]) -> None:

@@ -30,6 +30,7 @@ from lightfield.geometry.lenses import (
     from_camera,
     from_lightfield,
 )
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.lenses.division import Division
@@ -39,6 +40,7 @@ from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.equisolid import Equisolid
 from lightfield.geometry.lenses.extended_unified import ExtendedUnified
 from lightfield.geometry.lenses.f_theta import FTheta
+from lightfield.geometry.lenses.fisheye624 import Fisheye624
 from lightfield.geometry.lenses.fov_model import FovModel
 from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
@@ -46,10 +48,14 @@ from lightfield.geometry.lenses.orthographic import Orthographic
 from lightfield.geometry.lenses.polynomial import Polynomial
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.lenses.stereographic import Stereographic
+from lightfield.geometry.lenses.thin_prism_fisheye import ThinPrismFisheye
 from lightfield.geometry.lenses.unified import Unified
 
 BLENDER_POLYNOMIAL = (-1.17e-05, -0.0199887, -3.3525e-06, 3.09927e-06, -2.60646e-08)
 OPENCV = (-0.01, 0.03, -0.02, 0.003)
+RATIONAL = (8.1, 4.2, 1e-3, -8e-4, 0.2, 8.4, 6.1, 1.0)
+THIN_PRISM = (-0.01, 0.03, 2e-3, -1e-3, -0.02, 0.003, 3e-3, -2e-3)
+OF_624 = (-0.027, 0.102, -0.072, 0.0125, 1.2e-3, -4e-4, 5e-3, -4e-3, -2e-3, -4e-4, 3e-3, 1e-4)
 SIZE = {"width": 2048, "height": 1536}
 SHIFTED = {**SIZE, "principal_point": (900.25, 1000.5)}
 
@@ -76,6 +82,13 @@ EXAMPLES: dict[str, Lens] = {
     "kannala_brandt shifted": KannalaBrandt(
         **SHIFTED, focal_length=11, coefficients=(0, 0, 0, 0), fov=math.radians(300)
     ),
+    "brown_conrady": BrownConrady(**SIZE, focal_length=11, coefficients=RATIONAL),
+    "brown_conrady shifted": BrownConrady(
+        **SHIFTED, focal_length=17, coefficients=(-0.25, 0.09, 1e-3, -8e-4, -0.014, 0, 0, 0)
+    ),
+    "thin_prism_fisheye": ThinPrismFisheye(**SIZE, focal_length=11, coefficients=THIN_PRISM),
+    "fisheye624": Fisheye624(**SIZE, focal_length=11, coefficients=OF_624),
+    "fisheye624 shifted": Fisheye624(**SHIFTED, focal_length=11, coefficients=OF_624, fov=3.5),
     "division": Division(**SIZE, focal_length=11, coefficients=(-0.35,)),
     "division k > 0": Division(**SHIFTED, focal_length=30, coefficients=(0.2,)),
     "division k = 0": Division(**SIZE, focal_length=18, coefficients=(0.0,)),

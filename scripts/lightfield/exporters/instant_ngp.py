@@ -21,13 +21,19 @@ from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, model_validator
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import absolute_path, keep_apart, read_json, write_json
+from lightfield.core.files import (
+    absolute_path,
+    keep_apart,
+    link_or_copy,
+    read_json,
+    write_json,
+)
 from lightfield.core.names import PARTS, VIEWS
 from lightfield.core.progress import Progress
 from lightfield.engine.stage import ByHand, Stage, option, reads, writes
 from lightfield.export.disparity import FARTHEST
 from lightfield.export.source import DepthMaps, Floats, SourceDataset
-from lightfield.exporters.base import NO_DEPTH, Export, ExportSettings
+from lightfield.exporters.base import NO_DEPTH, ExportSettings, Joined
 from lightfield.formats.depth import check_size, depth_of
 from lightfield.formats.layout import Manifest
 from lightfield.formats.lightfield import LightField, View
@@ -68,7 +74,7 @@ def pictures_of(path: Path) -> list[str]:
         raise UserError(f"{path}: is not JSON with frames, each with a file_path") from None
 
 
-class InstantNgp(Export):
+class InstantNgp(Joined):
     """The transforms.json of instant-ngp."""
 
     name = "instant_ngp"
@@ -143,27 +149,35 @@ class InstantNgp(Export):
 
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write transforms.json into ``folder``, and the files that it names."""
-        images_folder = source.path(source.lightfield.views[0]).parent
-        places = _Places.of(folder / "transforms.json", images_folder)
+        view_images = {view.name: source.path(view) for view in source.lightfield.views}
+        places = _Places.of(folder / "transforms.json", view_images)
         _write(self, source.lightfield, source.suffix, places, source.training_list)
 
 
 @dataclass(frozen=True)
 class _Places:
-    """Where the files of an export lie: the transforms.json, and the folders of other files."""
+    """Where the files of an export lie: the transforms.json, images, and folders of other files.
+
+    - ``images``: the image of each view by the view's name. A view of another rig has a name that
+      its image does not have.
+    - ``copies``: the folder for copies of EXR views, and for links to the PNG views of other rigs.
+    """
 
     output: Path
-    images: Path
-    # Copies of EXR views.
-    exr: Path
+    images: Mapping[str, Path]
+    copies: Path
     depth: Path
 
     @classmethod
     def of(
-        cls, output: Path, images: Path, exr: Path | None = None, depth: Path | None = None
+        cls,
+        output: Path,
+        images: Mapping[str, Path],
+        copies: Path | None = None,
+        depth: Path | None = None,
     ) -> "_Places":
         folder = output.parent / "instant_ngp"
-        return cls(output, images, exr or folder, depth or folder / "depth")
+        return cls(output, images, copies or folder, depth or folder / "depth")
 
 
 def _write(
@@ -242,7 +256,7 @@ class _TransformsWriter:
             return _fitted_to_rig(cameras, -self.lightfield.world_from_cameras[:, :3, 2])
         points = np.concatenate(list(self.seen_points()))
         if not len(points):
-            raise UserError(f"{self.places.images}: no view sees anything at a finite depth")
+            raise UserError(f"{self.lightfield.path}: no view sees anything at a finite depth")
         return fitted(*scene_bounds(cameras, points))
 
     def seen_points(self) -> Iterator[Floats]:
@@ -262,12 +276,14 @@ class _TransformsWriter:
         frames = {}
         missing = []
         for view in self.lightfield.views:
-            image = self.places.images / f"{view.name}{self.suffix}"
+            image = self.places.images[view.name]
             if self.suffix == ".exr":
-                image = self.copied_exr(image)
+                image = self.copied_exr(view, image)
             else:
                 if not image.is_file():
                     missing.append(image)
+                elif image.stem != view.name:
+                    image = self.linked(view, image)
                 self.write_mask(view, image)
             frame: dict[str, Any] = {
                 "file_path": self.relative(image),
@@ -309,10 +325,16 @@ class _TransformsWriter:
 
     def depth(self, view: View, meaning: str) -> Floats:
         """Return a view's depth (height, width) in metres. ``meaning`` is "z" or "distance"."""
-        path = self.places.images / f"{view.name}.exr"
+        path = self.places.images[view.name].with_suffix(".exr")
         return depth_of(path, self.lightfield, self.rays, meaning)
 
-    def copied_exr(self, source: Path) -> Path:
+    def linked(self, view: View, source: Path) -> Path:
+        """Link a PNG view of another rig, whose folder no package of this rig has."""
+        target = self.places.copies / f"{view.name}{source.suffix}"
+        link_or_copy(source, target)
+        return target
+
+    def copied_exr(self, view: View, source: Path) -> Path:
         """Copy R, G, B as half floats. Pixels that instant-ngp must not train on become −1.
 
         Transparent views keep their channel A. Their colour stays premultiplied by it.
@@ -324,7 +346,7 @@ class _TransformsWriter:
             raise UserError(f"{source}: has no channel {missing[0]}")
         check_size(source, self.lightfield, channels["R"])
         hidden = self.blind | np.isnan(channels.get("Z", np.zeros(1)))
-        target = self.places.exr / source.name
+        target = self.places.copies / f"{view.name}.exr"
         planes = np.moveaxis(image.colour, -1, 0)
         copied = {
             name: np.where(hidden, -1, plane).astype(np.float16)
@@ -627,12 +649,14 @@ def write_by_hand(job: TransformsByHand) -> None:
     training_list = Path(job.settings.trained_by) if job.settings.trained_by else None
     lightfield = LightField.read(job.input_cfg)
     lightfield.require_centre()
-    places = _Places.of(job.output, job.image_dir or lightfield.folder, job.exr_dir, job.depth_dir)
+    folder = job.image_dir or lightfield.folder
+    view_images = {view.name: folder / f"{view.name}{suffix}" for view in lightfield.views}
+    places = _Places.of(job.output, view_images, job.exr_dir, job.depth_dir)
     keep_apart("--output", job.output, job.input_cfg, training_list)
     if job.depth_dir and not options.depth:
         raise UserError("--depth-dir: needs options.depth: true in the settings file")
     if suffix == ".exr":
-        keep_apart("--exr-dir", places.exr, places.images)
+        keep_apart("--exr-dir", places.copies, folder)
     elif options.depth:
-        keep_apart("--depth-dir", places.depth, places.images)
+        keep_apart("--depth-dir", places.depth, folder)
     _write(options, lightfield, suffix, places, training_list)

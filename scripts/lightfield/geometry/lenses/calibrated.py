@@ -129,16 +129,12 @@ class PolynomialOfAngle(CalibratedLens):
 
     @property
     @abstractmethod
-    def _polynomial(self) -> Sequence[float]:
+    def _terms(self) -> Sequence[float]:
         """The polynomial's coefficients, from the constant upwards."""
 
     @cached_property
     def _increasing(self) -> IncreasingPolynomial:
-        return IncreasingPolynomial(self._polynomial, last=self.fov / 2)
-
-    @property
-    def _largest_angle(self) -> float:
-        return self._increasing.end
+        return IncreasingPolynomial(self._terms, last=self.fov / 2)
 
     @cached_property
     def _limit(self) -> float:
@@ -202,3 +198,10 @@ def checked_range(name: str, value: float, is_inside: bool, allowed: str) -> Non
     """Raise `UserError` for a coefficient outside its range, which ``allowed`` describes."""
     if not is_inside:
         raise UserError(f"coefficients: {name} = {value} must be {allowed}")
+
+
+def odd_polynomial(terms: Sequence[float]) -> list[float]:
+    """Return the coefficients of θ + c1 θ³ + c2 θ⁵ + …, whose even powers have none."""
+    coefficients = np.zeros(2 * len(terms) + 2)
+    coefficients[1::2] = (1.0, *terms)
+    return coefficients.tolist()

@@ -34,5 +34,5 @@ class FTheta(PolynomialOfAngle):
     Settings = FThetaSettings
 
     @property
-    def _polynomial(self) -> list[float]:
+    def _terms(self) -> list[float]:
         return [0.0, 1.0, *self.coefficients]
