@@ -55,13 +55,26 @@ sin, cos, tan = np.sin, np.cos, np.tan
 # The lenses of calibrated cameras: r in focal lengths, at an angle t from the axis. k are the
 # coefficients.
 CALIBRATED: Any = {
-    "kannala_brandt": lambda k, t: t * np.polynomial.Polynomial([1, *k])(t * t),
+    "kannala_brandt": lambda k, t: ratio([1, *k], [1], t),
     "f_theta": lambda k, t: t * np.polynomial.Polynomial([1, *k])(t),
     "division": lambda k, t: 2 * sin(t) / (cos(t) + (cos(t) ** 2 - 4 * k[0] * sin(t) ** 2) ** 0.5),
     "fov_model": lambda k, t: np.arctan(2 * tan(k[0] / 2) * tan(t)) / k[0],
     "unified": lambda k, t: sin(t) / (cos(t) + k[0]),
     "extended_unified": lambda k, t: sin(t) / mixed(k[0], k[1] ** 0.5 * sin(t), cos(t)),
     "double_sphere": lambda k, t: sin(t) / mixed(k[1], sin(t), k[0] + cos(t)),
+    "brown_conrady": lambda k, t: ratio([1, *k[:2], k[4]], [1, *k[5:]], tan(t)),
+    "thin_prism_fisheye": lambda k, t: ratio([1, *k[:2], *k[4:6]], [1], t),
+    "fisheye624": lambda k, t: ratio([1, *k[:6]], [1], t),
+}
+# What bends a lens whose radial part is r: the radius in the plane of the bend at an angle, and r
+# at that radius. Then its tangential, prism and growing prism coefficients, as up + i right.
+BENT: Any = {
+    "brown_conrady": lambda k, r: (tan, lambda t: r(np.arctan(t)), 1j * k[3] - k[2], 0, 0),
+    "thin_prism_fisheye": lambda k, r: (np.abs, r, 1j * k[3] - k[2], 1j * k[6] - k[7], 0),
+    "fisheye624": lambda k, r: (
+        *(r, np.abs),
+        *(1j * k[6] - k[7], 1j * k[8] - k[10], 1j * k[9] - k[11]),
+    ),
 }
 
 
@@ -128,6 +141,7 @@ class PlainLens:
         self.center = camera.get("principal_point", self.size / 2)
         pixel = content["sensor_size"] / self.size  # mm
         length = camera.get("focal_length", camera.get("fisheye_lens"))
+        self.bend: Any = None
         self.unit = pixel / length if length else 2 / self.size  # The image circle has radius 1.
         # The largest angle θ from the axis. Then θ of r = |(u, v)|, and r of θ, for each lens.
         self.end = end = min(camera.get("fisheye_fov", np.pi) / 2, np.pi)
@@ -149,6 +163,8 @@ class PlainLens:
             curve = partial(CALIBRATED[name], camera[name])
             self.end = end = rim(curve, end)
             curves[self.kind] = lambda r: inverse(curve, end, 0, r), curve
+            if name in BENT:
+                self.bend = Bend(*BENT[name](camera[name], curve), end)
         elif self.kind == "LENS_POLYNOMIAL":
             k = np.array([camera[f"fisheye_polynomial_k{i}"] for i in range(5)])
             sign = -np.sign(k[1:][k[1:] != 0][0])
@@ -158,6 +174,8 @@ class PlainLens:
             self.unit, self.end = pixel, p(last)
             curves[self.kind] = lambda r: sign * p(r), lambda t: sign * inverse(p, last, hole, t)
         self.theta, self.radius = curves[self.kind]
+        if self.bend:
+            self.end = float(self.theta(np.array([self.bend.radius(self.bend.last)]))[0])
 
     def pixel_rays(self) -> Any:
         """Return the unit rays (height, width, 3) of all pixels' centres."""
@@ -170,7 +188,10 @@ class PlainLens:
         if self.kind == "EQUIRECTANGULAR":
             v = np.where(np.abs(v) <= np.pi / 2 + 1e-6, v, np.nan)
             return np.stack([cos(v) * sin(u), sin(v), -cos(v) * cos(u)], axis=-1)
-        r, azimuth, last = np.hypot(u, v), np.arctan2(u, v), np.abs(self.radius(self.end))
+        point, last = v + 1j * u, np.abs(self.radius(self.end))
+        if self.bend:
+            point = self.bend.unbent(point, self.theta(np.minimum(np.abs(point), last)))
+        r, azimuth = np.abs(point), np.angle(point)
         theta = np.where(r <= last * (1 + 1e-14), self.theta(np.minimum(r, last)), np.nan)
         right, up = sin(theta) * [sin(azimuth), cos(azimuth)]
         return np.stack([right, up, -cos(theta)], axis=-1)
@@ -184,16 +205,76 @@ class PlainLens:
             middle = (self.size[0] / 2 - self.center[0]) * self.unit[0]
             u -= 2 * np.pi * np.round((u - middle) / (2 * np.pi))
         else:
-            theta = np.arctan2(np.hypot(x, y), -z)
-            r = np.where(theta <= self.end * (1 + 1e-14), self.radius(theta), np.nan)
-            u, v = r * [sin(np.arctan2(x, y)), cos(np.arctan2(x, y))]
+            theta, direction = np.arctan2(np.hypot(x, y), -z), np.exp(1j * np.arctan2(x, y))
+            theta = np.where(theta <= self.end * (1 + 1e-14), theta, np.nan)
+            point = direction * self.radius(theta)
+            if self.bend:
+                point = self.bend.image(direction * self.bend.plane(theta))
+            u, v = point.imag, point.real
         return self.center + np.stack([u, -v], axis=-1) / self.unit
+
+
+class Bend:
+    """What moves the points of a lens that is not radial. A point is a number: up + i right.
+
+    It depends on the place in a plane. ``plane`` is a place's radius t at an angle, and ``radius``
+    is r at t.
+    """
+
+    def __init__(self, plane: Any, radius: Any, tangential: Any, prism: Any, growth: Any, end: Any):
+        self.plane, self.radius, self.tangential = plane, radius, tangential
+        self.prism, self.growth = prism, growth
+        self.last = last = float(plane(end))
+        t = np.sinh(np.linspace(0, np.arcsinh(last), 4097))
+        folds = np.flatnonzero(self.spread(t[1:]) <= 0)
+        if folds.size and (tangential or prism or growth):
+            self.last, last = t[folds[0]], t[folds[0] + 1]
+        while self.last < (middle := (self.last + last) / 2) < last:
+            self.last, last = (middle, last) if self.spread(middle) > 0 else (self.last, middle)
+
+    def spread(self, t: Any) -> Any:
+        """Return a lower bound of how far neighbours at t stay apart. At 0, they may meet."""
+        slope = (self.radius(t * (1 + 1e-6)) - self.radius(t * (1 - 1e-6))) / (2e-6 * t)
+        prism = np.abs(self.prism + 2 * self.growth * t * t)
+        moves = 2 * t * (3 * np.abs(self.tangential) + prism)
+        return np.minimum(slope, self.radius(t) / t) - moves
+
+    def image(self, places: Any) -> Any:
+        """Return the points at which the lens shows places of the plane."""
+        q = np.abs(places) ** 2
+        along = 2 * (np.conj(self.tangential) * places).real
+        sideways = self.tangential + self.prism + self.growth * q
+        return self.radial(places) + along * places + sideways * q
+
+    def radial(self, places: Any) -> Any:
+        """Return the points at which a radial lens shows places of the plane."""
+        t = np.maximum(np.abs(places), 1e-300)
+        return places / t * self.radius(t)
+
+    def unbent(self, points: Any, angles: Any) -> Any:
+        """Return the points of the radial lens, by Newton's method. ``angles`` are about right."""
+        places, h = self.plane(angles) * np.exp(1j * np.angle(points)), 1e-7
+        for _ in range(20):
+            error = points - self.image(places)
+            by_up = (self.image(places + h) - points + error) / h
+            by_right = (self.image(places + 1j * h) - points + error) / h
+            step = (np.conj(error) * by_right).imag + 1j * (np.conj(by_up) * error).imag
+            places = places + step / (np.conj(by_up) * by_right).imag
+            places = places * np.minimum(1, self.last / np.abs(places))
+        is_solved = np.abs(error) <= 1e-12 * (1 + np.abs(points))
+        return np.where(is_solved, self.radial(places), np.nan)
 
 
 def first_root(polynomial: Any) -> Any:
     """Return the smallest positive root, or inf."""
     roots = [r for r in np.roots(polynomial.coef[::-1]) if abs(r.imag) <= 1e-12 * abs(r)]
     return min([root.real for root in roots if root.real > 0], default=np.inf)
+
+
+def ratio(above: Any, below: Any, t: Any) -> Any:
+    """Return t times the ratio of two polynomials in t²."""
+    top, bottom = np.polynomial.Polynomial(above), np.polynomial.Polynomial(below)
+    return t * (top(t * t) / bottom(t * t))
 
 
 def mixed(alpha: float, across: Any, along: Any) -> Any:

@@ -76,28 +76,27 @@ class CalibratedLens(Fisheye):
         return self._pixel_size(self.focal_length)
 
     @property
-    def _largest_angle(self) -> float:
+    def _end(self) -> float:
         """The largest θ in radians."""
         with np.errstate(invalid="ignore"):
             return float(np.arccos(self._sin_cos(np.asarray(self._limit))[1]))
 
     @property
     def description(self) -> str:
-        return f"{self.title}, {2 * math.degrees(self._largest_angle):.4g}°"
+        return f"{self.title}, {2 * math.degrees(self._end):.4g}°"
 
     @property
     def clipped(self) -> str | None:
-        if self._largest_angle > self.fov / 2 - ANGLE_SLACK:
+        if self._end > self.fov / 2 - ANGLE_SLACK:
             return None
         rays = self.fitted(_COUNTED_SIDE).pixel_rays(np.float32)
         blank = float(np.isnan(rays[..., 0]).mean())
         if blank == 0:
             return None
-        end = math.degrees(self._largest_angle)
         return (
-            f"the {self.title} ends at {end:.4g}°, {self._limit:.4g} focal lengths from its "
-            f"principal point, so {100 * blank:.2g} % of the image has no ray; choose a smaller "
-            "limit by fov"
+            f"the {self.title} ends at {math.degrees(self._end):.4g}°, {self._limit:.4g} focal "
+            f"lengths from its principal point, so {100 * blank:.2g} % of the image has no ray; "
+            "choose a smaller limit by fov"
         )
 
     def _to_camera(self) -> dict[str, Any]:
@@ -136,6 +135,10 @@ class PolynomialOfAngle(CalibratedLens):
     def _increasing(self) -> IncreasingPolynomial:
         return IncreasingPolynomial(self._terms, last=self.fov / 2)
 
+    @property
+    def _end(self) -> float:
+        return self._increasing.end
+
     @cached_property
     def _limit(self) -> float:
         return float(self._increasing.value(self._increasing.end))
@@ -170,7 +173,7 @@ class ClosedForm(CalibratedLens):
         """Return r at θ."""
 
     @cached_property
-    def _largest_angle(self) -> float:
+    def _end(self) -> float:
         return min(self._rim[0], self.fov / 2)
 
     @cached_property
@@ -183,13 +186,13 @@ class ClosedForm(CalibratedLens):
 
     @property
     def has_z_depth(self) -> bool:
-        return self._largest_angle <= math.pi / 2 + ANGLE_SLACK
+        return self._end <= math.pi / 2 + ANGLE_SLACK
 
     def _sin_cos(self, r: Array) -> tuple[Array, Array]:
         return self._angle(r.astype(np.float64))
 
     def _radius(self, sin: Array, cos: Array) -> Array:
-        is_inside = np.arctan2(sin, cos) <= self._largest_angle * slack(sin.dtype)
+        is_inside = np.arctan2(sin, cos) <= self._end * slack(sin.dtype)
         r = self._distance(sin.astype(np.float64), cos.astype(np.float64))
         return np.where(is_inside, np.minimum(r, self._limit), np.nan)
 
