@@ -1248,7 +1248,8 @@ def test_a_point_cloud_may_have_views_that_see_no_surface(dataset, tmp_path):
     assert len(read_vertices(folder / "points.ply")) > 2000
 
 
-def test_views_of_another_lens_do_not_test(dataset):
+def test_views_of_another_lens_do_not_test(dataset, tmp_path):
     source = SourceDataset(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
+    settings = TypeAdapter(EXPORTERS["nerf_synthetic"]).validate_python({"sources": ["views"]})
     with pytest.raises(UserError, match="camera: must be the same as in"):
-        _ = source.lightfield
+        exports.run(source, settings, tmp_path / "export")

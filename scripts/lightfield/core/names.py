@@ -18,6 +18,8 @@ IMU = "imu"
 
 # The file that lists which of a scene's views are in which part of the split.
 SPLITS = "splits.json"
+# The file that lists which views the cameras of a head take at the same place.
+HEADS = "heads.json"
 Part = Literal["train", "validation", "test"]
 PARTS: tuple[Part, ...] = get_args(Part)
 

@@ -1,7 +1,7 @@
 """Writes a nerfstudio dataset: perspective views, fisheyes past 180° too, and full panoramas.
 
 - ``transforms.json``: camera-to-world matrices as in lightfield.json (OpenGL axes, Z up), and a
-  list of files for each part.
+  list of files for each part. Each frame has its own intrinsics if there are several lenses.
 - ``images/``: the views.
 - ``masks/``: 0 means ignored. Either all frames have a mask, or none.
 - ``depths/``: 16-bit millimetres, if the settings ask for them. Z for perspective views. Distance
@@ -21,7 +21,7 @@ import numpy as np
 from pydantic import Field
 
 from lightfield.core.files import write_json
-from lightfield.export import cameras
+from lightfield.export import cameras, heads
 from lightfield.export.pictures import write_pictures
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import DepthMaps, SourceDataset
@@ -73,10 +73,16 @@ class Nerfstudio(ForTraining):
             return f"has a lens that nerfstudio lacks; {TO_RECTILINEAR}, equidistant or a panorama"
         return NO_DEPTH if self.depth and not has_depth else None
 
+    def joins(self, lens: Lens, other: Lens) -> bool:
+        # nerfstudio has one camera model for all frames, which have their own parameters.
+        return bool(camera(lens)["camera_model"] == camera(other)["camera_model"])
+
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write a source's views into ``folder``."""
+        source = heads.by_camera(source)
         views = source.lightfield.views
         meaning = conventional_depth(source.lens)
+        has_lenses = len(source.lenses) > 1
         masked = any(not source.valid(view).all() for view in views)
         frames = []
         depth_maps = DepthMaps(_DEPTH_UNIT)
@@ -93,6 +99,8 @@ class Nerfstudio(ForTraining):
                 "file_path": f"images/{name}",
                 "transform_matrix": view.world_from_camera.tolist(),
             }
+            if has_lenses:
+                frame |= _parameters(source.view(view).lens)
             if masked:
                 frame["mask_path"] = f"masks/{name}"
             if self.depth:
@@ -104,8 +112,11 @@ class Nerfstudio(ForTraining):
         write_ply(folder / POINT_CLOUD, lift(source, count=self.points))
         paths = {view.name: frame["file_path"] for view, frame in zip(views, frames, strict=True)}
         lists = {"train": parts.train, "val": parts.validation, "test": parts.test}
+        intrinsics = camera(source.lens)
+        if has_lenses:
+            intrinsics = {"camera_model": intrinsics["camera_model"]}
         content = {
-            **camera(source.lens),
+            **intrinsics,
             "applied_transform": np.eye(4)[:3].tolist(),
             "ply_file_path": POINT_CLOUD,
         }
@@ -131,6 +142,11 @@ def camera(lens: Lens) -> dict[str, Any]:
     named = {f"k{number}": value for number, value in enumerate(distortion, 1)}
     focal = {"fl_x": fx, "fl_y": fy}
     return {"camera_model": "OPENCV_FISHEYE", **focal, **_center(lens), **size, **named}
+
+
+def _parameters(lens: Lens) -> dict[str, Any]:
+    """Return the keys that describe a lens of a known model."""
+    return {key: value for key, value in camera(lens).items() if key != "camera_model"}
 
 
 def _center(lens: Lens) -> dict[str, float]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from lightfield.core import units
 from lightfield.core.files import absolute_path
-from lightfield.core.names import IMU, MESH, SEQUENCE_PAGE, SPLITS, VIDEO
+from lightfield.core.names import HEADS, IMU, MESH, SEQUENCE_PAGE, SPLITS, VIDEO
 from lightfield.engine.read_files import check_since_plan
 from lightfield.exporters import EXPORTERS, lists_beside_views
 from lightfield.formats import blend
@@ -307,6 +307,8 @@ def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, 
         meanings.append((f"{GROUP_PREFIX}*/", "the light of each light group; the sum is the view"))
     if (folder.parent / SPLITS).is_file():
         meanings.append((f"../{SPLITS}", "which of the scene's views train, and which test"))
+    if lightfield.head:
+        meanings.append((f"../{HEADS}", "the cameras that share a body, and their views"))
     for reprojection in sorted(folder.glob(f"*/{NAME}")):
         reprojected = LightField.read(reprojection)
         meanings.append(

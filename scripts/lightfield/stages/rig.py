@@ -9,6 +9,7 @@ from pydantic import Field, PlainSerializer
 from lightfield.configuration.capture import LightfieldSettings
 from lightfield.core.names import FILE, IMU, INVENTORY
 from lightfield.engine.stage import ByHand, PlainStage, Stage, option, reads, writes
+from lightfield.geometry.boards import Boards
 from lightfield.geometry.rigs import Random, as_written
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.settings.base import Settings
@@ -35,6 +36,7 @@ class FreePlacesSettings(Settings):
     view_layers: Literal["all"] | list[str] | None = Field(
         None, description="As in the scene YAML."
     )
+    targets: Boards | None = Field(None, description="As in the scene YAML.")
 
 
 class FreePlaces(Stage[FreePlacesSettings]):
@@ -83,6 +85,18 @@ class MakeLightfield(Stage[LightfieldSettings]):
     def made(self) -> Iterator[Path]:
         yield from super().made()
         yield self.output.with_name(IMU)
+
+
+class FindCorners(PlainStage):
+    """Finds the corners of calibration boards in each view."""
+
+    name = "corners"
+    function = "lightfield.rendering.inspection.corners:write"
+
+    blend: Path = reads("the scene's .blend")
+    lightfield: Path = reads("lightfield.json of the dataset")
+    inventory: Path | None = reads(INVENTORY, None)
+    output: Path = writes("JSON to write")
 
 
 class CheckCameras(PlainStage):

@@ -160,6 +160,7 @@ def inventory(dataset: Dataset) -> InventorySettings:
     return InventorySettings.of(
         scene_name=source.scene_name,
         view_layers=source.view_layers,
+        targets=source.targets,
         allow_missing=source.allow_missing,
         motion_blur=written.render.motion_blur,
         rendered_frames=rendered_frames(datasets),
@@ -190,6 +191,7 @@ def free_places(dataset: Dataset) -> FreePlacesSettings:
         frame=source.frame,
         scene_name=source.scene_name,
         view_layers=source.view_layers,
+        targets=source.targets,
     )
 
 
@@ -225,6 +227,7 @@ def mesh(dataset: Dataset) -> MeshSettings:
         frame=source.frame,
         scene_name=source.scene_name,
         view_layers=source.view_layers,
+        targets=source.targets,
         numbered=not {"object", "instance"}.isdisjoint(dataset.render.passes or ()),
     )
 

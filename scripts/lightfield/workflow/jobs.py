@@ -190,6 +190,15 @@ CHECK_CAMERAS = Job(
     fields=fields.check_cameras,
     times="{scene}/{rig}/cameras/check_cameras",
 )
+CORNERS = Job(
+    "{scene}/{rig}/corners",
+    rig.FindCorners,
+    "cameras",
+    _costs(BLENDER),
+    fields=fields.corners,
+    times="{scene}/{rig}/cameras/corners",
+    file=lambda paths: paths.corners,
+)
 PROBE_CAMERAS = Job(
     "{scene}/probe_cameras",
     rig.MakeLightfield,
@@ -257,6 +266,14 @@ SPLITS = Job(
     "cameras",
     _costs(JOB),
     fields=fields.splits,
+    is_local=True,
+)
+HEADS = Job(
+    "{scene}/heads",
+    views.ListHeads,
+    "cameras",
+    _costs(JOB),
+    fields=fields.heads,
     is_local=True,
 )
 EXPORT = Job(

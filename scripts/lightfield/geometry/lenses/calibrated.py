@@ -119,7 +119,7 @@ class CalibratedLens(Fisheye):
         return {
             "focal_length": numbers["FOCAL_LENGTH"],
             "coefficients": tuple(numbers[name.upper()] for name in cls.coefficient_names),
-            "fov": numbers.get("FOV", 2 * math.pi),
+            **({"fov": numbers["FOV"]} if "FOV" in numbers else {}),
         }
 
 
@@ -201,3 +201,10 @@ def checked_range(name: str, value: float, is_inside: bool, allowed: str) -> Non
     """Raise `UserError` for a coefficient outside its range, which ``allowed`` describes."""
     if not is_inside:
         raise UserError(f"coefficients: {name} = {value} must be {allowed}")
+
+
+def odd_polynomial(terms: Sequence[float]) -> list[float]:
+    """Return the coefficients of θ + c1 θ³ + c2 θ⁵ + …, whose even powers have none."""
+    coefficients = np.zeros(2 * len(terms) + 2)
+    coefficients[1::2] = (1.0, *terms)
+    return coefficients.tolist()

@@ -3,10 +3,13 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field
 
-from lightfield.geometry.lenses.calibrated import CalibratedSettings, PolynomialOfAngle
+from lightfield.geometry.lenses.calibrated import (
+    CalibratedSettings,
+    PolynomialOfAngle,
+    odd_polynomial,
+)
 from lightfield.settings.base import as_list
 
 
@@ -36,7 +39,4 @@ class KannalaBrandt(PolynomialOfAngle):
 
     @property
     def _terms(self) -> list[float]:
-        # θ + k1 θ³ + k2 θ⁵ + …: the even powers of θ have no coefficient.
-        terms = np.zeros(10)
-        terms[1::2] = (1.0, *self.coefficients)
-        return terms.tolist()
+        return odd_polynomial(self.coefficients)
