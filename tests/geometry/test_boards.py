@@ -105,7 +105,7 @@ def test_a_standing_board_faces_its_camera_upright():
     ("keys", "message"),
     [
         (CHARUCO | {"marker": 0.04}, "marker: 0.04 m must be smaller than a square"),
-        (CHARUCO | {"squares": [1, 4]}, "squares: must be 2 or more each way"),
+        (CHARUCO | {"squares": [1, 4]}, "squares"),
         (CHARUCO | {"squares": [11, 10], "dictionary": "DICT_4X4_50"}, "squares: need 55 markers"),
         (CHARUCO | {"dictionary": "DICT_5x5_250"}, "dictionary"),
         (APRILGRID | {"tags": [30, 20]}, "tags: need 600 markers"),

@@ -50,8 +50,8 @@ def _one_of(names: Mapping[str, int]) -> AfterValidator:
     return AfterValidator(check)
 
 
-_Count = Annotated[int, Field(strict=True, ge=1, le=50)]
-_Counts = Annotated[tuple[_Count, _Count], as_list(2)]
+_Squares = Annotated[int, Field(strict=True, ge=2, le=50)]
+_Tags = Annotated[int, Field(strict=True, ge=1, le=50)]
 _Length = Annotated[float, Field(gt=0, le=100)]
 
 
@@ -160,17 +160,11 @@ class Board(Settings):
 class Checkerboard(Board):
     """The keys of boards of squares."""
 
-    squares: _Counts = Field(
+    squares: Annotated[tuple[_Squares, _Squares], as_list(2)] = Field(
         description="Number of squares across and down. The top left square is black.",
         json_schema_extra={"unit": "squares"},
     )
     square: _Length = Field(description="Side of a square.", json_schema_extra={"unit": "m"})
-
-    @model_validator(mode="after")
-    def _has_corners(self) -> Self:
-        if min(self.squares) < 2:
-            raise ValueError("squares: must be 2 or more each way, because corners lie between")
-        return self
 
     @property
     def _usual_margin(self) -> float:
@@ -204,7 +198,7 @@ class Charuco(Checkerboard):
     dictionary: Annotated[str, _one_of(_ALL_MARKERS)] = Field(
         "DICT_5X5_250",
         description="OpenCV's dictionary of the markers.",
-        examples=[*_ALL_MARKERS],
+        json_schema_extra={"enum": [*_ALL_MARKERS]},
     )
 
     @model_validator(mode="after")
@@ -241,7 +235,7 @@ class AprilGrid(Board):
     y_is_down = False
 
     type: Literal["aprilgrid"]
-    tags: _Counts = Field(
+    tags: Annotated[tuple[_Tags, _Tags], as_list(2)] = Field(
         description="Number of tags across and down: Kalibr's tagCols and tagRows.",
         json_schema_extra={"unit": "tags"},
     )
@@ -265,7 +259,7 @@ class AprilGrid(Board):
     dictionary: Annotated[str, _one_of(APRIL_TAGS)] = Field(
         "DICT_APRILTAG_36h11",
         description="OpenCV's dictionary of the tags. Kalibr reads 36h11.",
-        examples=[*APRIL_TAGS],
+        json_schema_extra={"enum": [*APRIL_TAGS]},
     )
 
     @model_validator(mode="after")

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.colors import LogNorm
+from matplotlib.ticker import StrMethodFormatter
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -139,5 +140,11 @@ def _draw(stem: Path, results: Mapping[str, CalibrationError]) -> None:
             axes.set_title(name.replace("_", " "))
             axes.grid(False)
             axes.set_axis_off()
-        bar = picture.figure.colorbar(picture, ax=all_axes, orientation="horizontal", shrink=0.6)
+        bar = picture.figure.colorbar(
+            picture,
+            ax=all_axes,
+            orientation="horizontal",
+            shrink=0.6,
+            format=StrMethodFormatter("{x:g}"),
+        )
         bar.set_label("error in pixels; white: no value")
