@@ -4,7 +4,8 @@
 - ``views.ncore4.zarr/``: the store.
   - ``cameras/camera/frames/<time>/``: a view as PNG, its name, and a mask if the view has pixels
     that show nothing. There 0 means ignored.
-  - ``intrinsics``: f-theta for fisheyes, OpenCV's pinhole for perspective views.
+  - ``intrinsics``: f-theta or OpenCV's fisheye for fisheyes, OpenCV's pinhole for perspective
+    views.
   - ``poses``: camera to world, with x right, y down and z forward, in metres.
   - ``lidars/points``: the points, as one frame of a lidar at the world's origin. All versions of
     gsplat's and 3DGRUT's readers take these. With other points, too, they stop.
@@ -41,7 +42,10 @@ from lightfield.exporters.base import ForTraining, PointCount
 from lightfield.formats.lightfield import View
 from lightfield.geometry.exposure import Floats, pose_between, row_times
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.f_theta import FTheta
+from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
@@ -129,9 +133,9 @@ class NCore(ForTraining):
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if isinstance(lens, Equidistant | Rectilinear):
+        if isinstance(lens, Equidistant | Rectilinear | BrownConrady | KannalaBrandt | FTheta):
             return None
-        return "is not an equidistant fisheye or a pinhole; reproject to one of them"
+        return "has a lens that NCore lacks; reproject to rectilinear or equidistant"
 
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write a source's views into ``folder``."""
@@ -189,12 +193,17 @@ def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
         "external_distortion_parameters": None,
     }
     parameters: dict[str, Any]
-    if isinstance(lens, Rectilinear):
+    if isinstance(lens, Rectilinear | BrownConrady):
+        radial, tangential = [0.0] * 6, [0.0] * 2
+        if isinstance(lens, BrownConrady):
+            named = cameras.distortion(lens)
+            radial = [named[f"k{number}"] for number in range(1, 7)]
+            tangential = [named["p1"], named["p2"]]
         parameters = {
             "principal_point": list(lens.center),
             "focal_length": list(cameras.focal_pixels(lens)),
-            "radial_coeffs": [0.0] * 6,
-            "tangential_coeffs": [0.0] * 2,
+            "radial_coeffs": radial,
+            "tangential_coeffs": tangential,
             "thin_prism_coeffs": [0.0] * 4,
         }
         # gsplat does not know NCore's "ideal-pinhole".
@@ -202,6 +211,20 @@ def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
             "camera_model_type": "opencv-pinhole",
             "camera_model_parameters": common | parameters,
         }
+    if isinstance(lens, KannalaBrandt):
+        parameters = {
+            "principal_point": list(lens.center),
+            "focal_length": list(cameras.focal_pixels(lens)),
+            "radial_coeffs": list(lens.coefficients),
+            "max_angle": cameras.widest_angle(lens),
+        }
+        return {
+            "camera_model_type": "opencv-fisheye",
+            "camera_model_parameters": common | parameters,
+        }
+    if isinstance(lens, FTheta):
+        parameters = _ftheta(lens)
+        return {"camera_model_type": "ftheta", "camera_model_parameters": common | parameters}
     if not isinstance(lens, Equidistant):
         raise TypeError(f"{type(lens).__name__} is not a lens of this export")
     pixels_a_radian = lens.height / lens.fov
@@ -216,6 +239,27 @@ def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
         "linear_cde": [lens.width / lens.height, 0.0, 0.0],
     }
     return {"camera_model_type": "ftheta", "camera_model_parameters": common | parameters}
+
+
+def _ftheta(lens: FTheta) -> dict[str, Any]:
+    """Return NCore's parameters of an f-theta lens, whose polynomial is NCore's reference."""
+    fx, fy = cameras.focal_pixels(lens)
+    widest = cameras.widest_angle(lens)
+    forward = np.array([0.0, fy, *(fy * k for k in lens.coefficients)])
+    # NCore starts Newton's method from this fit.
+    theta = np.linspace(0, widest, 257)[1:]
+    radius = np.polynomial.polynomial.polyval(theta, forward)
+    powers = radius[:, None] / radius[-1]
+    fitted, *_ = np.linalg.lstsq(powers ** np.arange(1, 6), theta, rcond=None)
+    backward = fitted / radius[-1] ** np.arange(1, 6)
+    return {
+        "principal_point": [lens.center[0] - 0.5, lens.center[1] - 0.5],
+        "reference_poly": "ANGLE_TO_PIXELDIST",
+        "pixeldist_to_angle_poly": [0.0, *backward.tolist()],
+        "angle_to_pixeldist_poly": forward.tolist(),
+        "max_angle": widest,
+        "linear_cde": [fx / fy, 0.0, 0.0],
+    }
 
 
 def _write_poses(store: ZarrStore, frames: Sequence[_Frame]) -> None:

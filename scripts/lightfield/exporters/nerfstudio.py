@@ -14,6 +14,7 @@ and refuses panoramas. Sources: nerfstudio's nerfstudio_dataparser.py and camera
 and formats/nerfstudio.rs of Brush 1.0.
 """
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +27,19 @@ from lightfield.export.pictures import write_pictures
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import DepthMaps, SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ForTraining, PointCount
+from lightfield.exporters.base import (
+    NO_DEPTH,
+    TO_RECTILINEAR,
+    ForTraining,
+    PointCount,
+    sideways_refusal,
+)
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.fisheye624 import Fisheye624
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
@@ -60,9 +69,16 @@ class Nerfstudio(ForTraining):
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if self.splatfacto and not isinstance(lens, Rectilinear):
+        # splatfacto undistorts OPENCV.
+        if self.splatfacto and not isinstance(lens, Rectilinear | BrownConrady):
             return f"would be taken for a pinhole by splatfacto; {TO_RECTILINEAR}"
-        if isinstance(lens, Equidistant | KannalaBrandt):
+        if isinstance(lens, BrownConrady):
+            if cameras.has_denominator(lens):
+                return f"has k4 to k6, which nerfstudio lacks; {TO_RECTILINEAR}"
+        elif isinstance(lens, Fisheye624):
+            if refusal := sideways_refusal(lens, "nerfstudio's FISHEYE624"):
+                return refusal
+        elif isinstance(lens, Equidistant | KannalaBrandt):
             has_pixel_on_axis = lens.center[0] % 1 == 0.5 and lens.center[1] % 1 == 0.5
             if has_pixel_on_axis:
                 return "has a pixel on its optical axis, which is NaN to nerfstudio; use even sizes"
@@ -76,7 +92,15 @@ class Nerfstudio(ForTraining):
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write a source's views into ``folder``."""
         views = source.lightfield.views
-        meaning = conventional_depth(source.lens)
+        # These rays have length 1 along the axis.
+        has_z_rays = isinstance(source.lens, BrownConrady | Fisheye624)
+        meaning = "z" if has_z_rays else conventional_depth(source.lens)
+        if isinstance(source.lens, BrownConrady) and cameras.distortion(source.lens)["k3"]:
+            print(
+                f"warning: {source.lightfield.path}: camera: has k3, which Brush leaves out; give "
+                "Brush the export colmap",
+                file=sys.stderr,
+            )
         masked = any(not source.valid(view).all() for view in views)
         frames = []
         depth_maps = DepthMaps(_DEPTH_UNIT)
@@ -127,8 +151,19 @@ def camera(lens: Lens) -> dict[str, Any]:
         undistorted = dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
         focal = {"fl_x": fx, "fl_y": fy}
         return {"camera_model": "OPENCV", **focal, **_center(lens), **size, **undistorted}
-    fx, fy, *distortion = cameras.opencv_fisheye(lens)
-    named = {f"k{number}": value for number, value in enumerate(distortion, 1)}
+    if isinstance(lens, BrownConrady):
+        fx, fy = cameras.focal_pixels(lens)
+        names = ("k1", "k2", "k3", "p1", "p2")
+        distortion = {name: cameras.distortion(lens)[name] for name in names}
+        focal = {"fl_x": fx, "fl_y": fy}
+        return {"camera_model": "OPENCV", **focal, **_center(lens), **size, **distortion}
+    if isinstance(lens, Fisheye624):
+        fx, fy = cameras.focal_pixels(lens)
+        focal = {"fl_x": fx, "fl_y": fy}
+        parameters = {"distortion_params": list(lens.coefficients)}
+        return {"camera_model": "FISHEYE624", **focal, **_center(lens), **size, **parameters}
+    fx, fy, *radial = cameras.opencv_fisheye(lens)
+    named = {f"k{number}": value for number, value in enumerate(radial, 1)}
     focal = {"fl_x": fx, "fl_y": fy}
     return {"camera_model": "OPENCV_FISHEYE", **focal, **_center(lens), **size, **named}
 
