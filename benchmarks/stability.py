@@ -31,7 +31,7 @@ import numpy as np
 
 try:
     import mpmath
-    from mpmath import asin, atan, atan2, cos, hypot, mpf, pi, sin, tan
+    from mpmath import acos, asin, atan, atan2, cos, hypot, mpf, pi, sin, sqrt, tan
 except ModuleNotFoundError:
     sys.exit("error: mpmath is missing: set it up with `make .venv/complete-for-tests`")
 
@@ -43,6 +43,7 @@ from lightfield.core.files import write_csv, write_text
 from lightfield.core.progress import Progress
 from lightfield.geometry.lenses import LENSES, Array, Lens
 from lightfield.geometry.lenses.base import CircleFisheye
+from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.imaging.plots import BLUE, VERMILION, plot
 
 # Roundings, each of one eps, in the longest chain of operations of one step.
@@ -77,7 +78,9 @@ def angles(lens: Any) -> tuple[int, list[mpf]]:
 
 
 def radii(lens: Any) -> list[mpf]:
-    """Return the coefficients of a Kannala–Brandt lens's r / f over θ; even powers have none."""
+    """Return the coefficients of a lens's r / f over θ, from the constant upwards."""
+    if lens.name == "f_theta":
+        return [mpf(0), mpf(1), *map(mpf, lens.coefficients)]
     coefficients = []
     for k in (1, *lens.coefficients):
         coefficients += [mpf(0), mpf(k)]
@@ -135,6 +138,162 @@ def orthographic_angle(lens: Any, r: mpf) -> mpf | None:
     return asin(sine) if sine <= 1 else None
 
 
+# The lenses of calibrated cameras, as they are published, with r in focal lengths. Each has θ at r,
+# r at θ, and the largest θ, whose r may be infinite.
+
+
+class Division:
+    """Fitzgibbon: tan θ = r / (1 + k r²)."""
+
+    def __init__(self, lens: Any) -> None:
+        self.k = mpf(lens.coefficients[0])
+
+    def angle(self, r: mpf) -> mpf:
+        return atan2(r, 1 + self.k * r * r)
+
+    def radius(self, t: mpf) -> mpf:
+        # The smallest positive root of k r² sin θ − r cos θ + sin θ.
+        root = sqrt(cos(t) ** 2 - 4 * self.k * sin(t) ** 2)
+        return (cos(t) - root) / (2 * self.k * sin(t)) if t else mpf(0)
+
+    @functools.cached_property
+    def last(self) -> tuple[mpf, mpf]:
+        if self.k < 0:
+            return +pi, INF
+        return atan(1 / (2 * sqrt(self.k))), 1 / sqrt(self.k)
+
+
+class FovModel:
+    """Devernay and Faugeras: r = atan(2 tan θ tan(ω / 2)) / ω."""
+
+    def __init__(self, lens: Any) -> None:
+        self.omega = mpf(lens.coefficients[0])
+
+    def angle(self, r: mpf) -> mpf:
+        return atan(tan(r * self.omega) / (2 * tan(self.omega / 2)))
+
+    def radius(self, t: mpf) -> mpf:
+        return atan(2 * tan(t) * tan(self.omega / 2)) / self.omega
+
+    @functools.cached_property
+    def last(self) -> tuple[mpf, mpf]:
+        return pi / 2, pi / (2 * self.omega)
+
+
+class Unified:
+    """Mei and Rives: r = sin θ / (cos θ + ξ), and their inverse."""
+
+    def __init__(self, lens: Any) -> None:
+        self.xi = mpf(lens.coefficients[0])
+
+    def angle(self, r: mpf) -> mpf:
+        factor = (self.xi + sqrt(1 + (1 - self.xi**2) * r * r)) / (1 + r * r)
+        return atan2(factor * r, factor - self.xi)
+
+    def radius(self, t: mpf) -> mpf:
+        return sin(t) / (cos(t) + self.xi)
+
+    @functools.cached_property
+    def last(self) -> tuple[mpf, mpf]:
+        if self.xi > 1:
+            return acos(-1 / self.xi), 1 / sqrt(self.xi**2 - 1)
+        return acos(-self.xi), INF
+
+
+class ExtendedUnified:
+    """Khomutenko et al.: r = sin θ / (α d + (1 − α) cos θ), and their inverse."""
+
+    def __init__(self, lens: Any) -> None:
+        self.alpha, self.beta = map(mpf, lens.coefficients)
+
+    def angle(self, r: mpf) -> mpf:
+        alpha, beta = self.alpha, self.beta
+        root = sqrt(1 - (2 * alpha - 1) * beta * r * r)
+        return atan2(r, (1 - beta * alpha**2 * r * r) / (alpha * root + 1 - alpha))
+
+    def radius(self, t: mpf) -> mpf:
+        d = sqrt(self.beta * sin(t) ** 2 + cos(t) ** 2)
+        return sin(t) / (self.alpha * d + (1 - self.alpha) * cos(t))
+
+    @functools.cached_property
+    def last(self) -> tuple[mpf, mpf]:
+        # cos θ = −w d = −w √(β sin² θ + cos² θ)
+        w = self.alpha / (1 - self.alpha)
+        if self.alpha > 0.5:
+            w = 1 / w
+        theta = atan2(sqrt(1 - w * w), -w * sqrt(self.beta))
+        return theta, 1 / sqrt(self.beta * (2 * self.alpha - 1)) if self.alpha > 0.5 else INF
+
+
+class DoubleSphere:
+    """Usenko et al.: r = sin θ / (α d2 + (1 − α)(ξ + cos θ)), and their inverse."""
+
+    def __init__(self, lens: Any) -> None:
+        self.xi, self.alpha = map(mpf, lens.coefficients)
+
+    def angle(self, r: mpf) -> mpf:
+        xi, alpha = self.xi, self.alpha
+        z = (1 - alpha**2 * r * r) / (alpha * sqrt(1 - (2 * alpha - 1) * r * r) + 1 - alpha)
+        factor = (z * xi + sqrt(z * z + (1 - xi**2) * r * r)) / (z * z + r * r)
+        return atan2(factor * r, factor * z - xi)
+
+    def divisor(self, t: mpf) -> mpf:
+        d2 = sqrt(sin(t) ** 2 + (self.xi + cos(t)) ** 2)
+        return self.alpha * d2 + (1 - self.alpha) * (self.xi + cos(t))
+
+    def radius(self, t: mpf) -> mpf:
+        return sin(t) / self.divisor(t)
+
+    @functools.cached_property
+    def last(self) -> tuple[mpf, mpf]:
+        # The paper's w2 is a little less than the θ at which r stops growing.
+        if self.alpha > 0.5:
+            r = 1 / sqrt(2 * self.alpha - 1)
+            return self.angle(r), r
+        return mpmath.findroot(self.divisor, (mpf(0), +pi), "anderson", maxsteps=300), INF
+
+
+PUBLISHED: dict[str, type[Any]] = {
+    "division": Division,
+    "fov_model": FovModel,
+    "unified": Unified,
+    "extended_unified": ExtendedUnified,
+    "double_sphere": DoubleSphere,
+}
+
+
+@functools.cache
+def published(lens: Any) -> Any:
+    """Return the published model of a lens."""
+    return PUBLISHED[lens.name](lens)
+
+
+def published_angle(lens: Any, r: mpf) -> mpf | None:
+    """Return θ at r, in mm, of a lens that is published with its inverse."""
+    model = published(lens)
+    r = r / lens.focal_length
+    return model.angle(r) if r <= model.last[1] else None
+
+
+def published_radius(lens: Any, theta: mpf) -> mpf | None:
+    """Return r, in mm, at θ, of a lens that is published with its inverse."""
+    model = published(lens)
+    last, r = model.last
+    if theta == last:
+        return None if r == INF else lens.focal_length * r
+    return lens.focal_length * model.radius(theta) if theta < last else None
+
+
+def polynomial_of_angle(lens: Any, theta: mpf) -> mpf | None:
+    """Return r, in mm, at θ, of a lens whose r is a polynomial of θ."""
+    return lens.focal_length * value(radii(lens), theta) if theta <= rise(lens) else None
+
+
+def angle_of_polynomial(lens: Any, r: mpf) -> mpf | None:
+    """Return θ at r, in mm, of a lens whose r is a polynomial of θ."""
+    return inverse(radii(lens), r / lens.focal_length, rise(lens))
+
+
 # θ at r, and r at θ, each None if missing; r as in the lenses' own definitions.
 RADIAL: dict[str, tuple[Callable[[Any, mpf], mpf | None], Callable[[Any, mpf], mpf | None]]] = {
     "rectilinear": (
@@ -161,10 +320,8 @@ RADIAL: dict[str, tuple[Callable[[Any, mpf], mpf | None], Callable[[Any, mpf], m
         lambda lens, r: angles(lens)[0] * value(angles(lens)[1], r),
         polynomial_radius,
     ),
-    "kannala_brandt": (
-        lambda lens, r: inverse(radii(lens), r / lens.focal_length, rise(lens)),
-        lambda lens, t: lens.focal_length * value(radii(lens), t) if t <= rise(lens) else None,
-    ),
+    **dict.fromkeys(("kannala_brandt", "f_theta"), (angle_of_polynomial, polynomial_of_angle)),
+    **dict.fromkeys(PUBLISHED, (published_angle, published_radius)),
 }
 
 
@@ -182,8 +339,12 @@ def largest_radius(lens: Any) -> mpf:
     last = half_fov(lens)
     if lens.name == "polynomial":
         last = min(last, value(angles(lens)[1], rise(lens)))
-    elif lens.name == "kannala_brandt":
+    elif lens.name in ("kannala_brandt", "f_theta"):
         last = min(last, rise(lens))
+    elif lens.name in PUBLISHED:
+        end, r = published(lens).last
+        if float(last) >= float(end):
+            return r * lens.focal_length
     return abs(RADIAL[lens.name][1](lens, last))
 
 
@@ -530,6 +691,17 @@ def extreme_lenses() -> dict[str, Lens]:
         "polynomial turned 220°": wide | {"coefficients": (0, 0.08, 1e-4, 1e-5, 0), "fov": 220},
         "kannala_brandt 360°": wide | {"coefficients": (0.01, -0.002, 3e-4, 0), "focal_length": 6},
         "kannala_brandt turning": odd | {"coefficients": (-0.3, 0, 0, 0), "focal_length": 12},
+        "division barrel": odd | {"coefficients": (-0.35,), "focal_length": 6},
+        "division turning": wide | {"coefficients": (0.3,), "focal_length": 12},
+        "fov_model": shifted | {"coefficients": (0.93,), "focal_length": 9},
+        "fov_model 3.1": wide | {"coefficients": (3.1,), "focal_length": 20},
+        "unified 0.9": odd | {"coefficients": (0.9,), "focal_length": 12},
+        "unified turning": wide | {"coefficients": (1e3,), "focal_length": 12e3},
+        "extended_unified turning": wide | {"coefficients": (0.63, 1.02), "focal_length": 6},
+        "extended_unified 0.3": odd | {"coefficients": (0.3, 100.0), "focal_length": 12},
+        "double_sphere turning": wide | {"coefficients": (-0.17, 0.59), "focal_length": 6},
+        "double_sphere 0.999": odd | {"coefficients": (0.999, 0.3), "focal_length": 6},
+        "f_theta turning": wide | {"coefficients": (-0.1, 0, 0, -1e-3), "focal_length": 9},
         "equirectangular": wide,
         "equirectangular odd": odd,
         "equirectangular 0.01°": wide | dict.fromkeys(("longitude", "latitude"), CORNER),
@@ -575,7 +747,8 @@ def places(lens: Lens) -> Array:
         (0.77 * width, 0.21 * height),
         (0, 0.4 * height),
     ]
-    if lens.name in ("polynomial", "kannala_brandt"):
+    turns = lens.name == "polynomial" or isinstance(lens, CalibratedLens)
+    if turns and largest_radius(lens) < INF:
         end = float(largest_radius(lens) / pixel_size(lens)[0])
         points += [
             (x + end, y),

@@ -39,6 +39,7 @@ from lightfield.export.source import SourceDataset
 from lightfield.exporters import BESIDE_VIEWS, EXPORTERS, SEQUENCE_EXPORTS, Exports, hci
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs
+from lightfield.geometry.lenses import calibrations
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.products import exports
@@ -57,6 +58,13 @@ OTHERS = {
     "FISHEYE624": CALIBRATED["RAD_TAN_THIN_PRISM_FISHEYE"],
     "f_theta": CALIBRATED["EUCM"]
     | {"lens": "f_theta", "coefficients": [0.02, -0.05, 0.003, 0.001], "focal_length": 10},
+}
+# It shows rays up to 115° in the image's corners.
+TUM_VI = {
+    "lens": "kannala_brandt",
+    "focal_length": 13.43,
+    "coefficients": [0.00348, 0.000715, -0.00205, 0.000203],
+    "resolution": [512, 512],
 }
 WIDE_624 = OTHERS["FISHEYE624"] | {"focal_length": 9}
 
@@ -1228,6 +1236,31 @@ def test_views_that_a_consumer_cannot_take_are_refused_by_hand_too(
 
 
 @pytest.mark.parametrize(
+    ("lens", "coefficients", "fov"),
+    [
+        ("brown_conrady", [-0.2, 0.05, 0.004, -0.003], 100),
+        ("kannala_brandt", [0.02, -0.01, 0.003, -0.001], 160),
+        ("fov_model", [0.9], 160),
+        ("unified", [0.9], 200),
+        ("double_sphere", [-0.17, 0.59], 200),
+        ("extended_unified", [0.63, 1.04], 200),
+    ],
+)
+def test_kalibr_gets_the_lens_of_the_views(tmp_path, lens, coefficients, fov):
+    camera = CALIBRATED["FOV"] | {"lens": lens, "coefficients": coefficients, "fov": fov}
+    write_views(tmp_path / "dataset", camera, RIG)
+    folder = exported(tmp_path / "dataset", "kalibr", "views", tmp_path)
+    angles, azimuths = np.radians(
+        np.meshgrid(np.linspace(0, fov / 2 - 1, 9), np.arange(0, 360, 40))
+    )
+    sin = np.sin(angles)
+    rays = np.stack([sin * np.cos(azimuths), sin * np.sin(azimuths), -np.cos(angles)], axis=-1)
+    found = calibrations.read(folder / "camchain.yaml")
+    expected = lenses.from_camera(camera).pixels(rays)
+    np.testing.assert_allclose(found.pixels(rays), expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
     ("name", "camera", "why"),
     [
         ("ncore", CALIBRATED["EUCM"], "has a lens that NCore lacks; reproject to"),
@@ -1238,12 +1271,24 @@ def test_views_that_a_consumer_cannot_take_are_refused_by_hand_too(
         ("nerfstudio", CALIBRATED["FOV"], "has a lens that nerfstudio lacks"),
         ("instant_ngp", OTHERS["FISHEYE624"], "cannot follow: it has a thin prism"),
         ("lichtfeld", OTHERS["OPENCV"], "has a lens that LichtFeld lacks"),
+        ("kalibr", OTHERS["FULL_OPENCV"], "has k3 to k6, which Kalibr lacks"),
+        ("kalibr", CALIBRATED["DIVISION"], "has a lens that Kalibr lacks"),
     ],
 )
 def test_calibrated_views_that_a_consumer_cannot_take_are_refused(tmp_path, name, camera, why):
     write_views(tmp_path / "dataset", camera, RIG)
     with pytest.raises(UserError, match=rf"lightfield.json: .*{why}"):
         exported(tmp_path / "dataset", name, "views", tmp_path / "exports")
+
+
+def test_ncore_refuses_a_fisheye_whose_rays_its_three_steps_miss():
+    """Three steps of Newton's method, from an angle proportional to the radius."""
+    refusals = {}
+    for fov in (360, 190):
+        lens = lenses.from_camera(TUM_VI | {"fov": fov})
+        refusals[fov] = EXPORTERS["ncore"](sources=["views"]).refusal(lens, True)
+    assert "NCore's inverse misses by 0.73 pixels" in refusals[360]
+    assert refusals[190] is None
 
 
 def by_hand(run_program, dataset, folder, *arguments):
@@ -1326,7 +1371,8 @@ def test_a_point_cloud_may_have_views_that_see_no_surface(dataset, tmp_path):
     assert len(read_vertices(folder / "points.ply")) > 2000
 
 
-def test_views_of_another_lens_do_not_test(dataset):
+def test_views_of_another_lens_do_not_test(dataset, tmp_path):
     source = SourceDataset(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
+    settings = TypeAdapter(EXPORTERS["nerf_synthetic"]).validate_python({"sources": ["views"]})
     with pytest.raises(UserError, match="camera: must be the same as in"):
-        _ = source.lightfield
+        exports.run(source, settings, tmp_path / "export")

@@ -285,6 +285,20 @@ def test_a_lens_that_ends_inside_its_image_is_a_warning_that_names_fov(tmp_path)
     assert warning.endswith("choose a smaller limit by fov")
 
 
+def test_a_lens_that_would_err_visibly_is_refused_before_the_first_job(tmp_path):
+    camera = "{lens: stereographic, fov: 359, resolution: [2048, 2048]}"
+    scene = CLIPPED.replace("{lens: equidistant, fov: 180, resolution: [24, 24]}", camera)
+    folder = checkout(tmp_path, clipped=scene)
+    arguments = ("--config", "scenes=[clipped]", "preset=full", "rigs=all")
+    run = snakemake(folder, "--cores", "1", *arguments)
+    assert run.returncode
+    (error,) = (line for line in run.stderr.splitlines() if line.startswith("error: "))
+    assert error.startswith("error: clipped/LFPlane: camera: ")
+    for words in ("stereographic fisheye, 359°", "0.62 pixels", "smaller fov"):
+        assert words in error
+    assert not list(folder.rglob("*.blend"))
+
+
 def phases(folder, *arguments):
     """Return the number of jobs of each phase in a plan of the smoke scene."""
     plan = snakemake(folder, "-n", *arguments, "scenes=[smoke]", "preset=full")

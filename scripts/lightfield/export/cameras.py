@@ -14,8 +14,10 @@ from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 
-def focal_pixels(lens: Rectilinear | CalibratedLens) -> tuple[float, float]:
+def focal_pixels(lens: Rectilinear | CalibratedLens | Equidistant) -> tuple[float, float]:
     """Return a lens's focal length in pixels, across and down."""
+    if isinstance(lens, Equidistant):
+        return lens.width / lens.fov, lens.height / lens.fov
     return (
         lens.focal_length * lens.width / lens.sensor[0],
         lens.focal_length * lens.height / lens.sensor[1],
@@ -30,7 +32,7 @@ def opencv_fisheye(lens: Lens) -> tuple[float, ...]:
     if isinstance(lens, KannalaBrandt):
         return (*focal_pixels(lens), *lens.coefficients)
     if isinstance(lens, Equidistant):
-        return (lens.width / lens.fov, lens.height / lens.fov, 0.0, 0.0, 0.0, 0.0)
+        return (*focal_pixels(lens), 0.0, 0.0, 0.0, 0.0)
     raise TypeError(f"{type(lens).__name__} is not a fisheye of OpenCV's")
 
 
@@ -56,8 +58,13 @@ def sees_sideways(lens: Lens) -> bool:
     return bool(in_frame.all(axis=-1).any() or (corners[:, 2] >= 0).any())
 
 
-def widest_angle(lens: CalibratedLens) -> float:
-    """Return the largest angle in radians from the axis that a radial lens sees."""
+def largest_angle(lens: CalibratedLens) -> float:
+    """Return the largest angle in radians from the axis that the image of a radial lens shows."""
+    corners = lens.rays([0, 0, lens.width, lens.width], [0, lens.height, 0, lens.height])
+    angles = np.arctan2(np.hypot(corners[:, 0], corners[:, 1]), -corners[:, 2])
+    if np.isfinite(angles).all():
+        return float(angles.max())
+    # The image shows the lens's rim.
     least, most = 0.0, math.pi
     while least < (middle := (least + most) / 2) < most:
         ray = np.array([math.sin(middle), 0, -math.cos(middle)])

@@ -120,6 +120,10 @@ class Export(Settings, ABC):
         """
         return None
 
+    def joins(self, lens: Lens, other: Lens) -> bool:
+        """Return whether one export can have views of both lenses."""
+        return lens == other
+
     def rig_refusal(self, rig: Rig) -> str | None:
         """Return why the consumer cannot take the views of a rig. None if it can."""
         if self.is_of_sequence and isinstance(rig, BlendCamera):
@@ -141,6 +145,29 @@ class Export(Settings, ABC):
 
         For an export beside the views, it is the folder of their lightfield.json.
         """
+
+
+class Joined(Export):
+    """Exports that may have the views of several rigs."""
+
+    # Settings name the folders of these rigs, so this changes no file of an export either.
+    together: Annotated[list[str], AfterValidator(unique_names)] | None = Field(
+        None,
+        min_length=2,
+        exclude=True,
+        description="In place of rigs: rigs whose views go into one export, in the folder of the "
+        "first. Names of the other rigs' views begin with the name of their rig.",
+    )
+
+    @model_validator(mode="after")
+    def _alone_or_together(self) -> Self:
+        if self.rigs and self.together:
+            raise ValueError("must have rigs or together, not both")
+        return self
+
+    @property
+    def joined_rigs(self) -> list[str]:
+        return self.together or []
 
 
 class Developed(Export):
@@ -169,30 +196,7 @@ class Developed(Export):
         return {key: value for key, value in super().recorded.items() if key != "look"}
 
 
-class Joining(Export):
-    """Exports that may have the views of several rigs."""
-
-    # Settings name the folders of these rigs, so this changes no file of an export either.
-    together: Annotated[list[str], AfterValidator(unique_names)] | None = Field(
-        None,
-        min_length=2,
-        exclude=True,
-        description="In place of rigs: rigs whose views go into one export, in the folder of the "
-        "first. Names of the other rigs' views begin with the name of their rig.",
-    )
-
-    @model_validator(mode="after")
-    def _alone_or_together(self) -> Self:
-        if self.rigs and self.together:
-            raise ValueError("must have rigs or together, not both")
-        return self
-
-    @property
-    def joined_rigs(self) -> list[str]:
-        return self.together or []
-
-
-class ForTraining(Joining, Developed):
+class ForTraining(Joined, Developed):
     """Exports to train with, which may have the views of several rigs."""
 
     is_for_training = True

@@ -1,18 +1,21 @@
 """Writes a COLMAP model, for gsplat, 3DGRUT, Brush and the original 3D Gaussian splatting.
 
-- ``sparse/0/``: cameras, images and points3D, in binary or as text.
+- ``sparse/0/``: cameras, images and points3D, in binary or as text. For the cameras of a head also
+  rigs and frames. Their images lie in a folder for each camera, with equal names.
 - ``images/``: the views as 8-bit PNG.
 - ``masks/<image>.png``: for views with pixels that show nothing. 0 means ignored.
 - ``stereo/depth_maps/<image>.geometric.bin``: Z-depth in metres, if the settings ask for it.
 
-Poses are world to camera, with x right, y down and z forward. Points are lifted from depth. Each
+Poses are world to camera, with x right, y down and z forward. The first camera of a head is its
+rig's reference. Points are lifted from depth. Each
 has the views that see it. One view is enough, because depth says where the point is. Source:
-COLMAP's format.rst, scene/reconstruction_io and sensor/models.h.
+COLMAP's format.rst, scene/reconstruction_io, sensor/rig.h and sensor/models.h.
 """
 
 import struct
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -22,7 +25,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from lightfield.core.files import atomic_path
-from lightfield.export import cameras
+from lightfield.export import cameras, heads
 from lightfield.export.pictures import write_pictures
 from lightfield.export.points import (
     Observations,
@@ -42,7 +45,7 @@ from lightfield.exporters.base import (
     sideways_refusal,
 )
 from lightfield.formats.lightfield import View
-from lightfield.geometry.colmap import pose
+from lightfield.geometry.colmap import pose, relative_pose
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.calibrated import CalibratedLens
@@ -87,6 +90,9 @@ _NOT_READ_BY = {
     "EUCM": "gsplat, 3DGRUT and Brush stop at",
 }
 
+# COLMAP's type of the sensors of a rig.
+_CAMERA_SENSOR = 0
+
 # A file beside the model, if the scene has a split: the names of the test images, one per line. The
 # original 3D Gaussian splatting reads it.
 TESTS = "test.txt"
@@ -118,8 +124,9 @@ class ColmapModel(ForTraining):
 
     def write_model(self, source: SourceDataset, folder: Path) -> None:
         """Write the model of a source's views into ``folder``."""
-        if problem := misreading(source.lens):
-            print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
+        for lens in source.lenses:
+            if problem := misreading(lens):
+                print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
         views = source.lightfield.views
         if any(view.split for view in views):
             tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]
@@ -144,9 +151,12 @@ class Colmap(ColmapModel):
     loader = "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')"
     needs_surfaces = True
 
+    def joins(self, lens: Lens, other: Lens) -> bool:
+        return True
+
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write the model of a source's views into ``folder``."""
-        self.write_model(source, folder)
+        self.write_model(heads.by_camera(source), folder)
 
 
 def model(source: SourceDataset, count: int) -> "Model":
@@ -219,7 +229,7 @@ class Model:
         seen_points: Sequence[Observations],
         visible: NDArray[np.intp],
     ) -> None:
-        self.lens = source.lens
+        self.cameras = heads.sensors(source)
         self.views = source.lightfield.views
         self.points = points.chosen(visible)
         number = np.zeros(len(points.positions), np.int64)
@@ -248,21 +258,71 @@ class Model:
             position = self.points.positions[index].tolist()
             yield index + 1, position, tuple(self.points.colours[index].tolist()), track
 
+    @cached_property
+    def camera_numbers(self) -> dict[str, int]:
+        """The number of each view's camera, from 1, by the view's name."""
+        numbered = enumerate(self.cameras, 1)
+        return {view.name: number for number, camera in numbered for view in camera.views}
+
+    @property
+    def has_rig(self) -> bool:
+        """Whether the cameras are a head."""
+        return self.cameras[0].mount is not None
+
+    def sensors(self) -> Iterator[tuple[int, Sequence[float]]]:
+        """Yield the number of each camera but the first, and its pose in the first one's axes."""
+        for number, first_from_camera in enumerate(heads.from_first(self.cameras)[1:], 2):
+            quaternion, translation = relative_pose(first_from_camera)
+            yield number, [*quaternion, *translation]
+
+    def frames(self) -> Iterator[tuple[int, Sequence[float], list[tuple[int, int]]]]:
+        """Yield the number of each place of the body, the first camera's pose, and its images.
+
+        An image is the number of its camera, and its own.
+        """
+        image_numbers = {view.name: number for number, view in enumerate(self.views, 1)}
+        for number, (first, *others) in enumerate(heads.places(self.cameras), 1):
+            images = [
+                (self.camera_numbers[view.name], image_numbers[view.name])
+                for view in (first, *others)
+            ]
+            quaternion, translation = pose(first.world_from_camera)
+            yield number, [*quaternion, *translation], images
+
     def write_binary(self, folder: Path) -> None:
-        (model, _), parameters = camera(self.lens)
-        size = (self.lens.width, self.lens.height)
-        _write(
-            folder / "cameras.bin",
-            [struct.pack(f"<QiiQQ{len(parameters)}d", 1, 1, model, *size, *parameters)],
-        )
+        _write(folder / "cameras.bin", self._binary_cameras())
         _write(folder / "images.bin", self._binary_images())
         _write(folder / "points3D.bin", self._binary_points())
+        if self.has_rig:
+            _write(folder / "rigs.bin", self._binary_rigs())
+            _write(folder / "frames.bin", self._binary_frames())
+
+    def _binary_cameras(self) -> Iterator[bytes]:
+        yield struct.pack("<Q", len(self.cameras))
+        for number, sensor in enumerate(self.cameras, 1):
+            (model, _), parameters = camera(sensor.lens)
+            size = (sensor.lens.width, sensor.lens.height)
+            yield struct.pack(f"<iiQQ{len(parameters)}d", number, model, *size, *parameters)
+
+    def _binary_rigs(self) -> Iterator[bytes]:
+        yield struct.pack("<QIIiI", 1, 1, len(self.cameras), _CAMERA_SENSOR, 1)
+        for number, sensor_from_rig in self.sensors():
+            yield struct.pack("<iIB7d", _CAMERA_SENSOR, number, True, *sensor_from_rig)
+
+    def _binary_frames(self) -> Iterator[bytes]:
+        frames = [*self.frames()]
+        yield struct.pack("<Q", len(frames))
+        for number, rig_from_world, images in frames:
+            yield struct.pack("<II7dI", number, 1, *rig_from_world, len(images))
+            for camera_number, image in images:
+                yield struct.pack("<iIQ", _CAMERA_SENSOR, camera_number, image)
 
     def _binary_images(self) -> Iterator[bytes]:
         yield struct.pack("<Q", len(self.views))
         for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
             quaternion, translation = pose(view.world_from_camera)
-            yield struct.pack("<i7di", number, *quaternion, *translation, 1)
+            camera_number = self.camera_numbers[view.name]
+            yield struct.pack("<i7di", number, *quaternion, *translation, camera_number)
             yield f"{view.name}.png".encode() + b"\0" + struct.pack("<Q", len(seen.indices))
             table = np.empty(len(seen.indices), [("pixel", "<f8", 2), ("point", "<i8")])
             table["pixel"] = seen.pixels
@@ -276,11 +336,29 @@ class Model:
             yield struct.pack(f"<{2 * len(track)}i", *(part for pair in track for part in pair))
 
     def write_text(self, folder: Path) -> None:
-        (_, model), parameters = camera(self.lens)
-        size = f"{self.lens.width} {self.lens.height}"
-        _write(folder / "cameras.txt", [f"1 {model} {size} {_text(parameters)}\n".encode()])
+        _write(folder / "cameras.txt", self._text_cameras())
         _write(folder / "images.txt", self._text_images())
         _write(folder / "points3D.txt", self._text_points())
+        if self.has_rig:
+            _write(folder / "rigs.txt", self._text_rigs())
+            _write(folder / "frames.txt", self._text_frames())
+
+    def _text_cameras(self) -> Iterator[bytes]:
+        for number, sensor in enumerate(self.cameras, 1):
+            (_, model), parameters = camera(sensor.lens)
+            size = f"{sensor.lens.width} {sensor.lens.height}"
+            yield f"{number} {model} {size} {_text(parameters)}\n".encode()
+
+    def _text_rigs(self) -> Iterator[bytes]:
+        yield f"1 {len(self.cameras)} CAMERA 1".encode()
+        for number, sensor_from_rig in self.sensors():
+            yield f" CAMERA {number} 1 {_text(sensor_from_rig)}".encode()
+        yield b"\n"
+
+    def _text_frames(self) -> Iterator[bytes]:
+        for number, rig_from_world, images in self.frames():
+            data = " ".join(f"CAMERA {camera_number} {image}" for camera_number, image in images)
+            yield f"{number} 1 {_text(rig_from_world)} {len(images)} {data}\n".encode()
 
     def _text_points(self) -> Iterator[bytes]:
         # Without a point the file would be empty.
@@ -292,7 +370,8 @@ class Model:
     def _text_images(self) -> Iterator[bytes]:
         for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
             quaternion, translation = pose(view.world_from_camera)
-            yield f"{number} {_text(quaternion + translation)} 1 {view.name}.png\n".encode()
+            name = f"{self.camera_numbers[view.name]} {view.name}.png"
+            yield f"{number} {_text(quaternion + translation)} {name}\n".encode()
             points = zip(seen.pixels.tolist(), seen.indices.tolist(), strict=True)
             yield (" ".join(f"{x!r} {y!r} {index}" for (x, y), index in points) + "\n").encode()
 

@@ -34,7 +34,7 @@ from lightfield.engine.stage import ByHand, Stage, option, reads, writes
 from lightfield.export import cameras
 from lightfield.export.disparity import FARTHEST
 from lightfield.export.source import DepthMaps, Floats, SourceDataset
-from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ExportSettings, Joining
+from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ExportSettings, Joined
 from lightfield.formats.depth import check_size, depth_of
 from lightfield.formats.layout import Manifest
 from lightfield.formats.lightfield import LightField, View
@@ -78,7 +78,7 @@ def pictures_of(path: Path) -> list[str]:
         raise UserError(f"{path}: is not JSON with frames, each with a file_path") from None
 
 
-class InstantNgp(Joining):
+class InstantNgp(Joined):
     """The transforms.json of instant-ngp."""
 
     name = "instant_ngp"

@@ -16,6 +16,8 @@ from lightfield.core.disk_space import Need, check_folder
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.base import RadialLens
+from lightfield.geometry.ray_table import ray_table
 from lightfield.planning.cost import light_group_count, rendering, temporary_bytes, view_cost
 from lightfield.planning.time_limits import limit_of_render
 from lightfield.stages.measurement import RENDERS_ON
@@ -177,14 +179,28 @@ class StartChecks:
                 print(f"warning: {name}: {problem}", file=sys.stderr)
 
     def _check_lenses(self) -> None:
-        """Warn of lenses whose equation ends inside the image."""
-        for name, lens in self._lenses().items():
+        """Warn of lenses whose equation ends inside the image.
+
+        Raises `UserError` for a lens that would not be rendered exactly.
+        """
+        lenses, rendered = self._lenses()
+        for name, lens in lenses.items():
             if lens.clipped:
                 print(f"warning: {name}: {lens.clipped}", file=sys.stderr)
+        for name in rendered:
+            lens = lenses[name]
+            if isinstance(lens, RadialLens) and not lens.in_cycles:
+                try:
+                    ray_table(lens)
+                except UserError as error:
+                    raise UserError(f"{name}: {error}") from None
 
-    def _lenses(self) -> dict[str, Lens]:
-        """Return the lenses of the planned views, by the names of their datasets."""
-        run, lenses = self._run, dict[str, Lens]()
+    def _lenses(self) -> tuple[dict[str, Lens], set[str]]:
+        """Return the lenses of the planned views, by the names of their datasets.
+
+        Also returns the names of the datasets that are rendered.
+        """
+        run, lenses, rendered = self._run, dict[str, Lens](), set[str]()
         for planned in self._plan.planned_jobs():
             if planned.job not in (RENDER, REPROJECT):
                 continue
@@ -192,10 +208,12 @@ class StartChecks:
             lens = dataset.rig.camera.make()
             if planned.job is RENDER:
                 lenses[dataset.sequence_name] = lens
+                if not dataset.imported:
+                    rendered.add(dataset.sequence_name)
             elif reprojection := run.asked(run.build.reprojection, planned.names):
                 name = f"{dataset.sequence_name}/{planned.names['reprojection']}"
                 lenses[name] = reprojection.lens(lens)
-        return lenses
+        return lenses, rendered
 
     def _check_times(self) -> None:
         """Raise `UserError` for a file that jobs read, and whose time is in the future.

@@ -121,7 +121,9 @@ class Lens(ABC):
     - ``title``: its name for people;
     - ``camera_types``: its ``panorama_type`` in lightfield.json, or its ``type`` for a perspective
       camera. The first is written, all are read;
-    - ``in_cycles``: whether Cycles renders it. Reprojection makes views of the others;
+    - ``in_cycles``: whether Cycles has it. A shader renders the others that are `RadialLens`;
+    - ``focuses_on_plane``: whether what is in focus is a plane, as for perspective lenses, or else
+      a sphere around the camera;
     - ``Settings``: its keys in a scene YAML, or None if a scene YAML cannot have it;
     - ``form``: the numbers of its flag, in mm and radians. Numbers in brackets are optional.
     """
@@ -130,6 +132,7 @@ class Lens(ABC):
     title: ClassVar[str]
     camera_types: ClassVar[tuple[str, ...]]
     in_cycles: ClassVar[bool] = False
+    focuses_on_plane: ClassVar[bool] = False
     Settings: ClassVar[type[LensSettings] | None] = None
     form: ClassVar[str | None] = None
 

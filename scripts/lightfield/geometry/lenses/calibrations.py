@@ -249,9 +249,11 @@ class _Keys:
         if any(side % 1 or not 1 <= side <= 2**16 for side in (width, height)):
             raise self.error(key, f"is {width:g} × {height:g}; must be whole numbers of pixels")
         size = int(width), int(height)
-        if hints.resolution not in (None, size):
+        if hints.resolution and hints.resolution != size:
             raise self.error(
-                key, f"is {size[0]} × {size[1]}; leave out the key resolution, which differs"
+                key,
+                f"is {size[0]} × {size[1]}, but the given resolution is {hints.resolution[0]} × "
+                f"{hints.resolution[1]}",
             )
         return size
 

@@ -34,6 +34,7 @@ class Division(ClosedForm):
     name = "division"
     title = "division-model lens"
     camera_types = ("FISHEYE_DIVISION",)
+    focuses_on_plane = True
     coefficient_names = ("k",)
     Settings = DivisionSettings
 
