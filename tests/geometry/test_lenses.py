@@ -588,6 +588,23 @@ def test_kannala_brandt_ends_at_its_turning_point() -> None:
     [
         # r = θ − θ³ / 3 turns at 1 rad.
         (KannalaBrandt(**LANDSCAPE, focal_length=9, coefficients=(-1 / 3, 0, 0, 0)), 57.3, 0.6667),
+        # r = t − t³ / 3 turns at t = 1, and θ = 45°.
+        (
+            BrownConrady(**LANDSCAPE, focal_length=18, coefficients=(-1 / 3, *[0.0] * 7)),
+            45,
+            0.6667,
+        ),
+        (
+            ThinPrismFisheye(**LANDSCAPE, focal_length=9, coefficients=(-1 / 3, *[0.0] * 7)),
+            57.3,
+            0.6667,
+        ),
+        # The prism alone folds the image: 2 s r = 1, before r = θ reaches 360° / 2.
+        (
+            Fisheye624(**LANDSCAPE, focal_length=9, coefficients=(*[0.0] * 8, 0.5, 0, 0, 0)),
+            57.3,
+            1,
+        ),
         # r = θ − θ² / 4 turns at 2 rad.
         (FTheta(**LANDSCAPE, focal_length=9, coefficients=(-0.25, 0, 0, 0)), 114.6, 1),
         # tan θ = r / (1 + r²) is at most 1 / 2.
@@ -952,6 +969,33 @@ CAMERA_YAML = [
         "focal_length: 10, coefficients: [-0.01, 0.03, -0.02, 0.003]",
         KannalaBrandt(**LANDSCAPE, focal_length=10, coefficients=OPENCV),
     ),
+    (
+        "focal_length: 20, coefficients: [-0.2]",
+        BrownConrady(**LANDSCAPE, focal_length=20, coefficients=(-0.2, *[0.0] * 7)),
+    ),
+    (
+        "focal_length: 20, coefficients: [-0.2, 0.1, 0.001, 0.002, 0.01], fov: 80",
+        BrownConrady(
+            **LANDSCAPE,
+            focal_length=20,
+            coefficients=(-0.2, 0.1, 1e-3, 2e-3, 0.01, 0, 0, 0),
+            fov=math.radians(80),
+        ),
+    ),
+    (
+        "focal_length: 10, coefficients: [0.1, 0, 0.001, 0.002, 0, 0, 0.003, -0.004]",
+        ThinPrismFisheye(
+            **LANDSCAPE, focal_length=10, coefficients=(0.1, 0, 1e-3, 2e-3, 0, 0, 3e-3, -4e-3)
+        ),
+    ),
+    (
+        "focal_length: 10, coefficients: [0.1, 0, 0, 0, 0, 0, 0.001, 0.002, 0.003, 0, 0, 0.004]",
+        Fisheye624(
+            **LANDSCAPE,
+            focal_length=10,
+            coefficients=(0.1, *[0.0] * 5, 1e-3, 2e-3, 3e-3, 0, 0, 4e-3),
+        ),
+    ),
     ("", Equirectangular(**LANDSCAPE)),
     (
         "longitude: [0, 180], latitude: [0, 90]",
@@ -1067,6 +1111,21 @@ def test_the_smallest_image(name: str) -> None:
             {"lens": "kannala_brandt", "focal_length": 9, "coefficients": [1]},
             "coefficients: is",
         ),
+        *(
+            (
+                {"lens": "brown_conrady", "focal_length": 9, "coefficients": wrong},
+                "coefficients: is .*; must be a list of 1 to 8 values",
+            )
+            for wrong in ([], [0.1] * 9, 0.1)
+        ),
+        (
+            {"lens": "thin_prism_fisheye", "focal_length": 9, "coefficients": [0.1]},
+            "coefficients: is .*; must be a list of 8 values",
+        ),
+        (
+            {"lens": "fisheye624", "focal_length": 9, "coefficients": [0.1] * 8},
+            "coefficients: is .*; must be a list of 12 values",
+        ),
         ({"lens": "equirectangular", "latitude": [10, -10]}, "latitude"),
         ({"lens": "equirectangular", "latitude": [-100, 0]}, "latitude"),
         ({"lens": "equirectangular", "longitude": [-180, 181]}, "longitude"),
@@ -1083,6 +1142,7 @@ def test_an_impossible_lens_is_refused(camera: dict[str, object], message: str) 
 
 OF_POLYNOMIAL = {"lens": "polynomial", "coefficients": [0, -0.1, 0, 0, 0]}
 OF_OPENCV = {"lens": "kannala_brandt", "focal_length": 9, "coefficients": [0, 0, 0, 0]}
+OF_BROWN = {"lens": "brown_conrady", "focal_length": 9, "coefficients": [-0.1]}
 EQUISOLID, PINHOLE = {"lens": "equisolid", "focal_length": 9}, {"lens": "rectilinear"}
 
 
@@ -1101,6 +1161,8 @@ EQUISOLID, PINHOLE = {"lens": "equisolid", "focal_length": 9}, {"lens": "rectili
         (EQUISOLID, "fov", [0.5, 360], [0, 360.5]),
         (OF_POLYNOMIAL, "fov", [0.5, 360], [0, 360.5]),
         (OF_OPENCV, "fov", [0.5, 360], [0, 360.5]),
+        (OF_BROWN, "fov", [0.5, 180], [0, 180.5]),
+        (OF_BROWN, "coefficients", [[0.1], [0.1] * 8], []),
         ({"lens": "equirectangular"}, "longitude", [[-180, 180]], [[-180.5, 0], [0, 180.5]]),
         ({"lens": "equirectangular"}, "latitude", [[-90, 90]], [[-90.5, 0], [0, 90.5]]),
     ],
@@ -1195,6 +1257,22 @@ def test_all_readers_have_the_same_limit_for_a_field_of_view(
             ),
         ),
         ("11,24,-.1,0,.02,0", FTheta(**SENSOR, focal_length=11, coefficients=(-0.1, 0, 0.02, 0))),
+        (
+            "11,24,8.1,4.2,1e-3,-8e-4,.2,8.4,6.1,1",
+            BrownConrady(**SENSOR, focal_length=11, coefficients=RATIONAL),
+        ),
+        (
+            "11,24,8.1,4.2,1e-3,-8e-4,.2,8.4,6.1,1,120deg",
+            BrownConrady(**SENSOR, focal_length=11, coefficients=RATIONAL, fov=math.radians(120)),
+        ),
+        (
+            "11,24,-.01,.03,2e-3,-1e-3,-.02,.003,3e-3,-2e-3,3",
+            ThinPrismFisheye(**SENSOR, focal_length=11, coefficients=THIN_PRISM, fov=3),
+        ),
+        (
+            "11,24,-.027,.102,-.072,.0125,1.2e-3,-4e-4,5e-3,-4e-3,-2e-3,-4e-4,3e-3,1e-4",
+            Fisheye624(**SENSOR, focal_length=11, coefficients=OF_624),
+        ),
         ("180deg", Equidistant(**LANDSCAPE, fov=math.pi)),
         ("9,24,90deg", Equisolid(**SENSOR, focal_length=9, fov=math.pi / 2)),
         (
