@@ -72,7 +72,7 @@ LACKING = {
     "thin_prism_fisheye": {
         "lens": "thin_prism_fisheye",
         "focal_length": 14,
-        "coefficients": [0.02, -0.03, 0.01, -0.005, 0.01, -0.002, 0.006, -0.001],
+        "coefficients": [0.02, -0.03, 0.002, -0.001, 0.01, -0.002, 0.002, -0.001],
         "fov": 170,
     },
     "fisheye624": {

@@ -9,7 +9,6 @@
 Source: Kalibr's wiki, "YAML formats", and its CameraParameters.
 """
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -20,7 +19,7 @@ import numpy as np
 from lightfield.core.files import write_text
 from lightfield.export import cameras, heads
 from lightfield.export.source import SourceDataset
-from lightfield.exporters.base import TO_RECTILINEAR, Joined, angle
+from lightfield.exporters.base import TO_RECTILINEAR, Joined, sideways_refusal
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.calibrated import CalibratedLens
@@ -48,13 +47,12 @@ class Kalibr(Joined):
     loader = "import yaml\ncameras = yaml.safe_load(open('{}/camchain.yaml'))"
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if isinstance(lens, Equidistant | KannalaBrandt) and lens.fov >= math.pi:
-            return f"{angle(lens)}, but Kalibr's pinhole ends below 180; give it a smaller fov"
         if isinstance(lens, BrownConrady) and any(lens.coefficients[_RADTAN:]):
-            return "has k3 to k6, which Kalibr lacks; leave them out"
-        if _model(lens) is None:
+            return f"has k3 to k6, which Kalibr lacks; {TO_RECTILINEAR}"
+        model = _model(lens)
+        if model is None:
             return f"has a lens that Kalibr lacks; {TO_RECTILINEAR}, or equidistant below 180°"
-        return None
+        return sideways_refusal(lens, "Kalibr's") if model.projection == "pinhole" else None
 
     def joins(self, lens: Lens, other: Lens) -> bool:
         return True
@@ -108,24 +106,18 @@ def _model(lens: Lens) -> _Model | None:
     return None
 
 
-def _focal_pixels(lens: Lens) -> tuple[float, float]:
-    """Return the focal lengths in pixels of a lens that Kalibr has."""
-    if isinstance(lens, Rectilinear | CalibratedLens):
-        return cameras.focal_pixels(lens)
-    fx, fy, *_ = cameras.opencv_fisheye(lens)
-    return fx, fy
-
-
 def _camera(sensor: heads.Sensor, number: int) -> dict[str, Any]:
     """Return the keys of a camera."""
     lens = sensor.lens
     model = _model(lens)
-    assert model  # `refusal` comes before.
+    # `refusal` comes before.
+    assert model
+    assert isinstance(lens, Rectilinear | Equidistant | CalibratedLens)
     center = [lens.center[0] - 0.5, lens.center[1] - 0.5]
     name = sensor.mount.name if sensor.mount else f"cam{number}"
     return {
         "camera_model": model.projection,
-        "intrinsics": [*model.parameters, *_focal_pixels(lens), *center],
+        "intrinsics": [*model.parameters, *cameras.focal_pixels(lens), *center],
         "distortion_model": model.distortion,
         "distortion_coeffs": [*model.coefficients],
         "resolution": [lens.width, lens.height],

@@ -164,7 +164,7 @@ class PlainLens:
             self.end = end = rim(curve, end)
             curves[self.kind] = lambda r: inverse(curve, end, 0, r), curve
             if name in BENT:
-                self.bend = Bend(*BENT[name](camera[name], curve), end)
+                self.bend = Bend(end, *BENT[name](camera[name], curve))
         elif self.kind == "LENS_POLYNOMIAL":
             k = np.array([camera[f"fisheye_polynomial_k{i}"] for i in range(5)])
             sign = -np.sign(k[1:][k[1:] != 0][0])
@@ -221,7 +221,7 @@ class Bend:
     is r at t.
     """
 
-    def __init__(self, plane: Any, radius: Any, tangential: Any, prism: Any, growth: Any, end: Any):
+    def __init__(self, end: Any, plane: Any, radius: Any, tangential: Any, prism: Any, growth: Any):
         self.plane, self.radius, self.tangential = plane, radius, tangential
         self.prism, self.growth = prism, growth
         self.last = last = float(plane(end))
