@@ -39,6 +39,7 @@ from lightfield.exporters.base import Developed, Export, ForTraining
 from lightfield.formats import render_block, sensors
 from lightfield.geometry import boards, inertia, rigs
 from lightfield.geometry.lenses import LENSES
+from lightfield.geometry.lenses.calibration_settings import CalibrationSettings
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import mount, path, rig, split_setting
 from lightfield.settings.base import MEANINGS
@@ -110,6 +111,7 @@ RIG_MODELS = _models(rigs.AnyRig)
 LENS_MODELS: list[type[BaseModel]] = [
     *[lens.Settings for lens in LENSES.values() if lens.Settings],
     FileSettings,
+    CalibrationSettings,
 ]
 
 # The pages of keys, by the names of their files.

@@ -6,10 +6,11 @@ import re
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
-from sphere import look_at_ball, write_views
+from sphere import CALIBRATED, look_at_ball, write_views
 
 from lightfield.core.errors import UserError
 from lightfield.engine.flags import parsed
@@ -41,6 +42,7 @@ PERSPECTIVE = {
 FISHEYE = {"lens": "equidistant", "resolution": [64, 64], "fov": 180}
 WIDE = {"lens": "equidistant", "resolution": [65, 65], "fov": 220}
 ORTHOGRAPHIC = {"lens": "orthographic", "resolution": [512, 512], "fov": 180}
+OPENCV = CALIBRATED["OPENCV"]
 PANORAMA = {"lens": "equirectangular", "resolution": [64, 32]}
 HALF_PANORAMA = {"lens": "equirectangular", "longitude": [-90, 90], "resolution": [32, 32]}
 
@@ -131,9 +133,21 @@ class Loader:
                     math.cos(phi) * math.cos(theta),
                 ]
             )
+        elif any(self.json.get(key) for key in ("k1", "k2", "p1", "p2")):
+            local = np.append(self.undistorted(u * width, v * height), 1)
         else:
             local = np.array([u * width / self.json["fl_x"], v * height / self.json["fl_y"], 1])
         return origin, axes @ local.astype(np.float32)
+
+    def undistorted(self, across: float, down: float) -> Any:
+        """Return the tangents of OpenCV's point at this many pixels from the principal point."""
+        matrix = np.diag([self.json["fl_x"], self.json["fl_y"], 1])
+        # The loader puts k3 and k4 where p1 and p2 are.
+        assert not {"k3", "k4"} & {*self.json}
+        distortion = np.array([self.json[key] for key in ("k1", "k2", "p1", "p2")])
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-12)
+        point = np.array([[[across, down]]], float)
+        return cv2.undistortPoints(point, matrix, distortion, criteria=criteria)[0, 0]
 
 
 def silvr_orientation(point: Any) -> list[float]:
@@ -344,7 +358,7 @@ def test_missing_images_are_a_warning(dataset: Dataset, capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize("meaning", ["z", "distance"])
-@pytest.mark.parametrize("camera", [PERSPECTIVE, FISHEYE])
+@pytest.mark.parametrize("camera", [PERSPECTIVE, FISHEYE, OPENCV])
 def test_the_loaders_depth_is_the_true_distance(
     camera: Any, meaning: str, dataset: Dataset
 ) -> None:
@@ -653,6 +667,18 @@ def test_other_fisheyes_are_approximated_to_a_quarter_of_a_pixel(
         assert abs(angle_between(direction, axes[:, 2]) - angle) < 0.25 * pixel
 
 
+def test_the_loader_undistorts_opencvs_lens(dataset: Dataset) -> None:
+    dataset.write(OPENCV)
+    loader = Loader(dataset.export())
+    lens = lenses.from_camera(OPENCV)
+    axes, _ = loader.camera(0)
+    for x, y in ((3, 4), (60, 10), (31, 24), (20, 44)):
+        _, direction = loader.ray(0, x, y)
+        # The loader's camera looks along z, with y down.
+        expected = lens.rays(x, y) * [1, -1, -1]
+        assert angle_between(axes.T @ direction, expected) < 1e-6
+
+
 @pytest.mark.parametrize("turned", [1, -1])
 def test_a_polynomial_lens_is_exported_exactly(turned: int, dataset: Dataset) -> None:
     terms = [0.01, -0.1, 2e-3, -3e-4, 1e-5]  # Radians per mm^i; a pixel has 36 / 64 mm.
@@ -681,6 +707,8 @@ def test_a_polynomial_lens_is_exported_exactly(turned: int, dataset: Dataset) ->
         (ORTHOGRAPHIC | {"resolution": [64, 64]}, [], "misses it by 0.41 pixels"),
         (ORTHOGRAPHIC | {"resolution": [40, 40]}, [], "misses it by 0.26 pixels"),
         (PANORAMA | {"latitude": [-45, 45]}, [], "instant-ngp cannot follow"),
+        (CALIBRATED["FULL_OPENCV"], [], r"cannot follow this lens \(it has p1 or p2 beside k3"),
+        (CALIBRATED["THIN_PRISM_FISHEYE"], [], r"cannot follow this lens \(it has a thin prism"),
         (PANORAMA | {"longitude": [-180, 170]}, [], "instant-ngp cannot follow"),
         # A fisheye along both axes of the image, but not between them.
         (HALF_PANORAMA, [], "instant-ngp cannot follow"),

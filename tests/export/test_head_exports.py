@@ -24,6 +24,7 @@ from lightfield.export.source import SourceDataset
 from lightfield.exporters import EXPORTERS
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses, rigs
+from lightfield.geometry.lenses import calibrations
 from lightfield.imaging import images
 from lightfield.products import exports
 
@@ -262,3 +263,40 @@ def test_a_camera_with_a_name_of_ncores_is_refused(tmp_path):
     head = dict.fromkeys(("front", "points"), BACK_TO_BACK["front"])
     with pytest.raises(UserError, match="head: NCore has a points itself"):
         exported(datasets(tmp_path, head), "ncore", tmp_path / "ncore")
+
+
+CALIBRATED = {
+    "brown_conrady": {"coefficients": [-0.28, 0.07, 0.0002, -0.0001]},
+    "fov_model": {"coefficients": [0.9]},
+    "double_sphere": {"coefficients": [-0.2, 0.59]},
+    "extended_unified": {"coefficients": [0.62, 1.1]},
+    "unified": {"coefficients": [0.9]},
+}
+
+
+@pytest.mark.parametrize("lens", CALIBRATED)
+def test_a_camchain_is_read_back_as_the_same_lens(lens, tmp_path):
+    camera = {
+        "lens": lens,
+        "fov": 80,
+        "focal_length": 30,
+        "sensor_size": [36, 27],
+        "principal_point": [31, 25.5],
+        "resolution": [64, 48],
+        **CALIBRATED[lens],
+    }
+    head = {"left": {"camera": camera}, "right": {"camera": camera, "position": [0.1, 0, 0]}}
+    folder = exported(datasets(tmp_path, head), "kalibr", tmp_path / "kalibr")
+    expected = lenses.from_camera(camera)
+    found = calibrations.read(folder / "camchain.yaml", "cam1", fov=np.radians(80))
+    points = np.random.default_rng(3).normal(size=(200, 3)) * [0.5, 0.5, 0.1] - [0, 0, 2]
+    pixels = expected.pixels(points)
+    assert expected.in_frame(pixels).sum() > 50
+    np.testing.assert_allclose(found.pixels(points), pixels, atol=1e-9)
+
+
+def test_more_radial_terms_than_kalibrs_are_refused():
+    camera = {"lens": "brown_conrady", "focal_length": 30, "resolution": [64, 48]}
+    settings = TypeAdapter(EXPORTERS["kalibr"]).validate_python({"sources": ["views"]})
+    lens = lenses.from_camera(camera | {"coefficients": [-0.28, 0.07, 0, 0, 0.01]})
+    assert "k3" in settings.refusal(lens, has_depth=True)

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from lightfield.core.errors import UserError
 from lightfield.geometry import rigs
 from lightfield.geometry.inertia import measured, world_from_body
+from lightfield.geometry.rigs.mount import Mount
 
 BEND = [[0, 0, 1], [1, 0.4, 1.2], [1.5, 1.6, 0.9], [0.3, 2.0, 1.1]]
 TURNED = [
@@ -138,6 +139,17 @@ def test_the_pair_of_a_stereo_rig_lies_beside_the_body():
     np.testing.assert_allclose((left + right) / 2, motion.positions, atol=1e-11)
     across = np.einsum("nij,ni->nj", world_from_body(motion), right - left)
     np.testing.assert_allclose(across, np.full((9, 3), [0.2, 0, 0]), atol=1e-11)
+
+
+def test_the_cameras_of_a_head_lie_on_the_body():
+    rig = path(keys=AHEAD)
+    mount = Mount(head="pair", name="back", position=(0.1, 0, 0.2), rotation=(0, 180, 0))
+    mounted = rig.model_copy(update={"mount": mount})
+    motion = mounted.motion(mounted.view_times())
+    poses = np.array([pose.world_from_camera() for pose in mounted.poses()])
+    apart = np.einsum("nij,ni->nj", world_from_body(motion), poses[:, :3, 3] - motion.positions)
+    np.testing.assert_allclose(apart, np.full((9, 3), [0.1, 0, -0.2]), atol=1e-11)
+    np.testing.assert_allclose(poses[:, :3, 2], -motion.world_from_camera[..., 2], atol=1e-11)
 
 
 def test_the_motion_does_not_depend_on_the_number_of_views():

@@ -285,8 +285,22 @@ def test_a_lens_that_ends_inside_its_image_is_a_warning_that_names_fov(tmp_path)
     assert warning.endswith("choose a smaller limit by fov")
 
 
-def test_a_lens_that_would_err_visibly_is_refused_before_the_first_job(tmp_path):
-    camera = "{lens: stereographic, fov: 359, resolution: [2048, 2048]}"
+@pytest.mark.parametrize(
+    ("camera", "said"),
+    [
+        (
+            "{lens: stereographic, fov: 359, resolution: [2048, 2048]}",
+            ["stereographic fisheye, 359°", "0.62 pixels"],
+        ),
+        (
+            "{lens: brown_conrady, focal_length: 15, coefficients: [-0.3, 0, 0.002, -0.001],"
+            " resolution: [752, 480]}",
+            ["Brown–Conrady lens"],
+        ),
+    ],
+    ids=["steep", "folds"],
+)
+def test_a_lens_that_would_err_visibly_is_refused_before_the_first_job(tmp_path, camera, said):
     scene = CLIPPED.replace("{lens: equidistant, fov: 180, resolution: [24, 24]}", camera)
     folder = checkout(tmp_path, clipped=scene)
     arguments = ("--config", "scenes=[clipped]", "preset=full", "rigs=all")
@@ -294,7 +308,7 @@ def test_a_lens_that_would_err_visibly_is_refused_before_the_first_job(tmp_path)
     assert run.returncode
     (error,) = (line for line in run.stderr.splitlines() if line.startswith("error: "))
     assert error.startswith("error: clipped/LFPlane: camera: ")
-    for words in ("stereographic fisheye, 359°", "0.62 pixels", "smaller fov"):
+    for words in (*said, "smaller fov"):
         assert words in error
     assert not list(folder.rglob("*.blend"))
 

@@ -549,6 +549,17 @@ def test_a_warning_is_printed_once(dataset, run, capsys):
 
 
 @pytest.mark.parametrize(
+    ("fov", "warnings"), [("", 1), (",360deg", 1), (",250deg", 0)], ids=["none", "360", "250"]
+)
+def test_a_lens_that_ends_inside_its_image_is_a_warning(dataset, run, capsys, fov, warnings):
+    run("--double-sphere", f"6,36,-0.172,0.593{fov}", "--png", "--views", "0:1")
+    lines = capsys.readouterr().err.splitlines()
+    found = [line for line in lines if line.startswith("warning: the double-sphere fisheye ends")]
+    assert len(found) == warnings
+    assert all("fov" in line for line in found)
+
+
+@pytest.mark.parametrize(
     "flags",
     [
         ("--equisolid", "10,36,3.0"),
@@ -559,6 +570,15 @@ def test_a_warning_is_printed_once(dataset, run, capsys):
         ("--equirectangular=-1,1,-0.5,0.5",),
         ("--polynomial", "0,-0.07,0,0,0,36,3"),
         ("--kannala-brandt", "9,36,0.01,0,0,0"),
+        ("--brown-conrady", "22,36,-0.2,0.05,0.003,-0.002,0,0,0,0"),
+        ("--thin-prism-fisheye", "9,36,-0.01,0.01,0.003,-0.002,0,0,0.004,-0.003"),
+        ("--fisheye624", "9,36,-0.01,0.01,0,0,0,0,0.003,-0.002,0.004,0,-0.003,0"),
+        ("--division", "12,36,-0.2"),
+        ("--fov-model", "12,36,0.9"),
+        ("--unified", "20,36,0.9"),
+        ("--extended-unified", "11,36,0.6,1.1"),
+        ("--double-sphere", "11,36,-0.2,0.6"),
+        ("--f-theta", "9,36,-0.01,0.02,0,-0.001"),
     ],
 )
 def test_every_lens_is_a_target_and_a_source(dataset, run, flags):

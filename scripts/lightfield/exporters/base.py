@@ -15,10 +15,10 @@ from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.core.names import PARTS, VIEWS
 from lightfield.engine.stage import cause
+from lightfield.export import cameras
 from lightfield.formats.layout import Manifest
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
-from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import BlendCamera, Rig
 from lightfield.imaging import blender_looks
@@ -202,8 +202,17 @@ class ForTraining(Joined, Developed):
     is_for_training = True
 
 
-def angle(lens: Equidistant | KannalaBrandt) -> str:
+def angle(lens: Equidistant) -> str:
     return f"sees {math.degrees(lens.fov):g} degrees"
+
+
+def sideways_refusal(lens: Lens, program: str) -> str | None:
+    """Return why a program whose lenses end below 180° cannot take a lens. None if it can."""
+    if isinstance(lens, Equidistant) and lens.fov >= math.pi:
+        return f"{angle(lens)}, but {program} fisheye ends below 180; give it a smaller fov"
+    if not isinstance(lens, Rectilinear | Equidistant) and cameras.sees_sideways(lens):
+        return f"sees 90 degrees from its axis, where {program} lenses end; give it a fov below 180"
+    return None
 
 
 def odd_size_refusal(lens: Lens) -> str | None:

@@ -12,7 +12,6 @@ has the views that see it. One view is enough, because depth says where the poin
 COLMAP's format.rst, scene/reconstruction_io, sensor/rig.h and sensor/models.h.
 """
 
-import math
 import struct
 import sys
 from collections.abc import Iterable, Iterator, Sequence
@@ -38,19 +37,58 @@ from lightfield.export.points import (
 )
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ForTraining, PointCount, angle
+from lightfield.exporters.base import (
+    NO_DEPTH,
+    TO_RECTILINEAR,
+    ForTraining,
+    PointCount,
+    sideways_refusal,
+)
 from lightfield.formats.lightfield import View
 from lightfield.geometry.colmap import pose, relative_pose
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
+from lightfield.geometry.lenses.calibrated import CalibratedLens
+from lightfield.geometry.lenses.division import Division
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.extended_unified import ExtendedUnified
+from lightfield.geometry.lenses.fisheye624 import Fisheye624
+from lightfield.geometry.lenses.fov_model import FovModel
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.lenses.thin_prism_fisheye import ThinPrismFisheye
+from lightfield.geometry.lenses.unified import Unified
 
 PINHOLE = (1, "PINHOLE")
+OPENCV = (4, "OPENCV")
 OPENCV_FISHEYE = (5, "OPENCV_FISHEYE")
+FULL_OPENCV = (6, "FULL_OPENCV")
+EUCM = (16, "EUCM")
 # Whole panoramas. Since COLMAP 4.1.
 EQUIRECTANGULAR = (17, "EQUIRECTANGULAR")
+# COLMAP has the coefficients of these lenses in the same order.
+_CALIBRATED: dict[type[Lens], tuple[int, str]] = {
+    KannalaBrandt: OPENCV_FISHEYE,
+    FovModel: (7, "FOV"),
+    ThinPrismFisheye: (10, "THIN_PRISM_FISHEYE"),
+    Fisheye624: (11, "RAD_TAN_THIN_PRISM_FISHEYE"),
+    Division: (13, "DIVISION"),
+    ExtendedUnified: EUCM,
+}
+_ALL: tuple[type[Lens], ...] = (
+    *(Rectilinear, Equidistant, Equirectangular, BrownConrady, Unified),
+    *_CALIBRATED,
+)
+# Who does not read a model, but reads the others of COLMAP's.
+_NOT_READ_BY = {
+    "FULL_OPENCV": "gsplat stops at",
+    "FOV": "gsplat and 3DGRUT stop at, and Brush takes for a pinhole",
+    "THIN_PRISM_FISHEYE": "gsplat and 3DGRUT stop at",
+    "RAD_TAN_THIN_PRISM_FISHEYE": "gsplat, 3DGRUT and Brush stop at",
+    "DIVISION": "gsplat, 3DGRUT and Brush stop at",
+    "EUCM": "gsplat, 3DGRUT and Brush stop at",
+}
 
 # COLMAP's type of the sensors of a rig.
 _CAMERA_SENSOR = 0
@@ -72,23 +110,22 @@ class ColmapModel(ForTraining):
     depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if isinstance(lens, Equidistant | KannalaBrandt):
-            # COLMAP projects only points in front of the camera.
-            if lens.fov >= math.pi:
-                return f"{angle(lens)}, but COLMAP's fisheye ends below 180; give it a smaller fov"
-        elif isinstance(lens, Equirectangular):
+        if isinstance(lens, Equirectangular):
             if not lens.is_full:
                 return f"is a part of a panorama; COLMAP takes whole ones; {TO_RECTILINEAR}"
             if self.depth:
                 return "is a panorama, for which COLMAP has no depth maps; leave out depth: true"
-        elif not isinstance(lens, Rectilinear):
+        elif not isinstance(lens, _ALL):
             return f"has a lens that COLMAP lacks; {TO_RECTILINEAR}, or equidistant below 180°"
+        # The models of all other lenses project only points in front of the camera.
+        elif not isinstance(lens, Division) and (refusal := sideways_refusal(lens, "COLMAP's")):
+            return refusal
         return NO_DEPTH if self.depth and not has_depth else None
 
     def write_model(self, source: SourceDataset, folder: Path) -> None:
         """Write the model of a source's views into ``folder``."""
         for lens in source.lenses:
-            if problem := cameras.misreading(lens):
+            if problem := misreading(lens):
                 print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
         views = source.lightfield.views
         if any(view.split for view in views):
@@ -154,8 +191,32 @@ def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:
         return PINHOLE, [*cameras.focal_pixels(lens), *lens.center]
     if isinstance(lens, Equirectangular):
         return EQUIRECTANGULAR, [float(lens.width), float(lens.height)]
-    fx, fy, *distortion = cameras.opencv_fisheye(lens)
-    return OPENCV_FISHEYE, [fx, fy, *lens.center, *distortion]
+    if isinstance(lens, Equidistant):
+        fx, fy, *distortion = cameras.opencv_fisheye(lens)
+        return OPENCV_FISHEYE, [fx, fy, *lens.center, *distortion]
+    assert isinstance(lens, CalibratedLens)
+    fx, fy = cameras.focal_pixels(lens)
+    if isinstance(lens, Unified):
+        # It is an extended unified lens with β = 1, whose focal length counts in other units.
+        (xi,) = lens.coefficients
+        return EUCM, [fx / (1 + xi), fy / (1 + xi), *lens.center, xi / (1 + xi), 1.0]
+    parameters = [fx, fy, *lens.center, *lens.coefficients]
+    if isinstance(lens, BrownConrady):
+        is_short = not any(lens.coefficients[4:])
+        return (OPENCV, parameters[:8]) if is_short else (FULL_OPENCV, parameters)
+    return _CALIBRATED[type(lens)], parameters
+
+
+def misreading(lens: Lens) -> str | None:
+    """Return how readers of COLMAP models misread a lens's model, or None if they do not.
+
+    Source: examples/datasets/colmap.py of gsplat, dataset_colmap.py of 3DGRUT, and
+    colmap-reader/src/lib.rs and formats/colmap.rs of Brush.
+    """
+    (_, name), _ = camera(lens)
+    if name in _NOT_READ_BY:
+        return f"is COLMAP's {name}, which {_NOT_READ_BY[name]}; give them perspective views"
+    return cameras.misreading(lens)
 
 
 class Model:

@@ -31,16 +31,20 @@ from lightfield.core.files import (
 from lightfield.core.names import PARTS, VIEWS
 from lightfield.core.progress import Progress
 from lightfield.engine.stage import ByHand, Stage, option, reads, writes
+from lightfield.export import cameras
 from lightfield.export.disparity import FARTHEST
 from lightfield.export.source import DepthMaps, Floats, SourceDataset
-from lightfield.exporters.base import NO_DEPTH, ExportSettings, Joined
+from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ExportSettings, Joined
 from lightfield.formats.depth import check_size, depth_of
 from lightfield.formats.layout import Manifest
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, conventional_depth
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.fisheye624 import Fisheye624
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.lenses.thin_prism_fisheye import ThinPrismFisheye
 from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rotations import euler_to_matrix, nearest_to_axes
 from lightfield.imaging import images
@@ -128,6 +132,8 @@ class InstantNgp(Joined):
         return self
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if reason := _asymmetry(lens):
+            return f"is a lens that instant-ngp cannot follow: {reason}; {TO_RECTILINEAR}"
         return NO_DEPTH if (self.depth or self.bounds == "depth") and not has_depth else None
 
     def rig_refusal(self, rig: Rig) -> str | None:
@@ -239,7 +245,8 @@ class _TransformsWriter:
         self.blind = _blind_pixels(self.lens)
         # The loader multiplies depth by the length of the ray. A perspective ray has length 1 along
         # the axis. All other rays have length 1. The loader ignores a depth of 0.
-        self.meaning = conventional_depth(self.lens)
+        # Rays of a pinhole, distorted or not, have length 1 along the axis in the loader.
+        self.meaning = "z" if _is_projected_to_plane(self.lens) else conventional_depth(self.lens)
 
     def placement(self) -> tuple[float, list[float]]:
         """Return scale and offset from the settings, or fit them to depth, or to the rig."""
@@ -390,8 +397,9 @@ def transform_matrix(view: View) -> Floats:
 def lens_keys(lens: Lens) -> dict[str, Any]:
     """Return the keys that describe a lens to the loader.
 
-    A fisheye is written as θ = Σ p_i r^i with r in pixels (``ftheta``), which is exact for
-    equidistant and polynomial lenses. A panorama is written as ``latlong``, because the loader's
+    A lens of Brown and Conrady is written as OpenCV's, unless it has k3 to k6. A fisheye is written
+    as θ = Σ p_i r^i with r in pixels (``ftheta``), which is exact for equidistant and polynomial
+    lenses. A panorama is written as ``latlong``, because the loader's
     ``equirectangular`` is linear in the sine of the latitude. Raises `UserError` if the loader
     would miss the lens by more than a quarter of a pixel.
     """
@@ -402,21 +410,53 @@ def lens_keys(lens: Lens) -> dict[str, Any]:
         "cy": lens.center[1],
     }
     if isinstance(lens, Rectilinear):
-        focal_x, focal_y = _axis_pixels(lens, 1.0)
-        return {
-            "camera_angle_x": 2 * math.atan(lens.width / (2 * focal_x)),
-            "camera_angle_y": 2 * math.atan(lens.height / (2 * focal_y)),
-            "fl_x": focal_x,
-            "fl_y": focal_y,
-            **keys,
-        }
+        return {**_focal_keys(lens, *_axis_pixels(lens, 1.0)), **keys}
+    if isinstance(lens, BrownConrady) and _is_projected_to_plane(lens):
+        named = cameras.distortion(lens)
+        coefficients = {name: named[name] for name in ("k1", "k2", "p1", "p2")}
+        return {**_focal_keys(lens, *cameras.focal_pixels(lens)), **keys, **coefficients}
     if _is_full_panorama(lens):
         focal = lens.width / (2 * math.pi)
         return {"fl_x": focal, "fl_y": focal, **keys, "latlong": True}
+    if reason := _asymmetry(lens):
+        raise UserError(_not_followed(reason))
     polynomial = _ftheta(lens)
     focal = 1 / abs(polynomial[1])
     coefficients = {f"ftheta_p{power}": value for power, value in enumerate(polynomial)}
     return {"fl_x": focal, "fl_y": focal, **keys, **coefficients}
+
+
+def _focal_keys(lens: Lens, focal_x: float, focal_y: float) -> dict[str, float]:
+    """Return the keys of a pinhole's focal lengths in pixels."""
+    return {
+        "camera_angle_x": 2 * math.atan(lens.width / (2 * focal_x)),
+        "camera_angle_y": 2 * math.atan(lens.height / (2 * focal_y)),
+        "fl_x": focal_x,
+        "fl_y": focal_y,
+    }
+
+
+def _has_more_than_opencv(lens: BrownConrady) -> bool:
+    """Return whether a lens has k3 to k6, which the loader's ``OpenCV`` lacks."""
+    return any(lens.coefficients[4:])
+
+
+def _asymmetry(lens: Lens) -> str | None:
+    """Return why the loader has no lens that is as asymmetric as this one. None if it has one."""
+    if isinstance(lens, ThinPrismFisheye | Fisheye624):
+        return "it has a thin prism"
+    if isinstance(lens, BrownConrady) and _has_more_than_opencv(lens):
+        named = cameras.distortion(lens)
+        if named["p1"] or named["p2"]:
+            return "it has p1 or p2 beside k3 to k6"
+    return None
+
+
+def _is_projected_to_plane(lens: Lens) -> bool:
+    """Return whether the loader takes the lens for a pinhole, distorted or not."""
+    if isinstance(lens, BrownConrady):
+        return not _has_more_than_opencv(lens)
+    return isinstance(lens, Rectilinear)
 
 
 def _blind_pixels(lens: Lens) -> NDArray[np.bool_]:
@@ -427,7 +467,7 @@ def _blind_pixels(lens: Lens) -> NDArray[np.bool_]:
     """
     rays = lens.pixel_rays()
     blind: NDArray[np.bool_] = np.isnan(rays).any(axis=-1)
-    if not isinstance(lens, Rectilinear) and not _is_full_panorama(lens):
+    if not _is_projected_to_plane(lens) and not _is_full_panorama(lens):
         blind |= ~(rays[..., 2] < -1e-6)
         y, x = np.ogrid[: lens.height, : lens.width]
         blind |= (x + 0.5 == lens.center[0]) & (y + 0.5 == lens.center[1])

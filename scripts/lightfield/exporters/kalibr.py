@@ -1,32 +1,41 @@
 """Writes Kalibr's camchain.yaml: the lenses of one camera or of a head, and their relative poses.
 
 - ``cam0``, ``cam1`` …: the cameras, in the order of the scene YAML.
-- ``intrinsics``: focal lengths and principal point in pixels. Pixel centres are whole numbers.
+- ``intrinsics``: the model's parameters, focal lengths and principal point in pixels. Pixel centres
+  are whole numbers.
 - ``T_cn_cnm1``: the matrix from the camera before to this one, with x right, y down and z forward,
   in metres.
 
 Source: Kalibr's wiki, "YAML formats", and its CameraParameters.
 """
 
-import math
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lightfield.core.files import write_text
 from lightfield.export import cameras, heads
 from lightfield.export.source import SourceDataset
-from lightfield.exporters.base import TO_RECTILINEAR, Joined, angle
+from lightfield.exporters.base import TO_RECTILINEAR, Joined, sideways_refusal
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
+from lightfield.geometry.lenses.calibrated import CalibratedLens
+from lightfield.geometry.lenses.double_sphere import DoubleSphere
 from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.extended_unified import ExtendedUnified
+from lightfield.geometry.lenses.fov_model import FovModel
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.lenses.unified import Unified
 from lightfield.geometry.rigs import Rig
 
 # From Blender's camera (y up, looks along −z) to Kalibr's (y down, looks along z).
 _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
+# The number of coefficients of Kalibr's radtan: k1, k2, p1 and p2.
+_RADTAN = 4
 
 
 class Kalibr(Joined):
@@ -38,13 +47,12 @@ class Kalibr(Joined):
     loader = "import yaml\ncameras = yaml.safe_load(open('{}/camchain.yaml'))"
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if isinstance(lens, Rectilinear):
-            return None
-        if not isinstance(lens, Equidistant | KannalaBrandt):
+        if isinstance(lens, BrownConrady) and any(lens.coefficients[_RADTAN:]):
+            return f"has k3 to k6, which Kalibr lacks; {TO_RECTILINEAR}"
+        model = _model(lens)
+        if model is None:
             return f"has a lens that Kalibr lacks; {TO_RECTILINEAR}, or equidistant below 180°"
-        if lens.fov >= math.pi:
-            return f"{angle(lens)}, but Kalibr's pinhole ends below 180; give it a smaller fov"
-        return None
+        return sideways_refusal(lens, "Kalibr's") if model.projection == "pinhole" else None
 
     def joins(self, lens: Lens, other: Lens) -> bool:
         return True
@@ -68,22 +76,50 @@ class Kalibr(Joined):
         write_text(folder / "camchain.yaml", text)
 
 
+class _Model(NamedTuple):
+    """A lens in Kalibr's words. ``parameters`` stand before the focal lengths."""
+
+    projection: str
+    parameters: Sequence[float]
+    distortion: str
+    coefficients: Sequence[float]
+
+
+def _model(lens: Lens) -> _Model | None:
+    """Return Kalibr's model of a lens. None for a lens that it lacks."""
+    match lens:
+        case Rectilinear():
+            return _Model("pinhole", (), "radtan", (0.0,) * _RADTAN)
+        case BrownConrady():
+            return _Model("pinhole", (), "radtan", lens.coefficients[:_RADTAN])
+        case Equidistant() | KannalaBrandt():
+            _, _, *coefficients = cameras.opencv_fisheye(lens)
+            return _Model("pinhole", (), "equidistant", coefficients)
+        case FovModel():
+            return _Model("pinhole", (), "fov", lens.coefficients)
+        case DoubleSphere():
+            return _Model("ds", lens.coefficients, "none", ())
+        case ExtendedUnified():
+            return _Model("eucm", lens.coefficients, "none", ())
+        case Unified():
+            return _Model("omni", lens.coefficients, "none", ())
+    return None
+
+
 def _camera(sensor: heads.Sensor, number: int) -> dict[str, Any]:
     """Return the keys of a camera."""
     lens = sensor.lens
-    if isinstance(lens, Rectilinear):
-        model = "radtan"
-        fx, fy = cameras.focal_pixels(lens)
-        distortion = [0.0] * 4
-    else:
-        model = "equidistant"
-        fx, fy, *distortion = cameras.opencv_fisheye(lens)
+    model = _model(lens)
+    # `refusal` comes before.
+    assert model
+    assert isinstance(lens, Rectilinear | Equidistant | CalibratedLens)
+    center = [lens.center[0] - 0.5, lens.center[1] - 0.5]
     name = sensor.mount.name if sensor.mount else f"cam{number}"
     return {
-        "camera_model": "pinhole",
-        "intrinsics": [fx, fy, lens.center[0] - 0.5, lens.center[1] - 0.5],
-        "distortion_model": model,
-        "distortion_coeffs": distortion,
+        "camera_model": model.projection,
+        "intrinsics": [*model.parameters, *cameras.focal_pixels(lens), *center],
+        "distortion_model": model.distortion,
+        "distortion_coeffs": [*model.coefficients],
         "resolution": [lens.width, lens.height],
         "rostopic": f"/{name}/image_raw",
     }

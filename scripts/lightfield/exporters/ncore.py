@@ -5,7 +5,8 @@
   - ``cameras/camera/frames/<time>/``: a view as PNG, its name, and a mask if the view has pixels
     that show nothing. There 0 means ignored. The cameras of a head have their own names, and frames
     at the same times.
-  - ``intrinsics``: f-theta for fisheyes, OpenCV's pinhole for perspective views.
+  - ``intrinsics``: f-theta or OpenCV's fisheye for fisheyes, OpenCV's pinhole for perspective
+    views.
   - ``poses``: camera to world, with x right, y down and z forward, in metres.
   - ``lidars/points``: the points, as one frame of a lidar at the world's origin. All versions of
     gsplat's and 3DGRUT's readers take these. With other points, too, they stop.
@@ -29,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from pydantic import Field
 
 from lightfield.core.errors import UserError
@@ -42,7 +44,10 @@ from lightfield.exporters.base import ForTraining, PointCount
 from lightfield.formats.lightfield import View
 from lightfield.geometry.exposure import Floats, pose_between, row_times
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.f_theta import FTheta
+from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
@@ -57,6 +62,10 @@ _DEFAULT = "default"
 STEP = 1_000_000
 # Microseconds of a moving camera's exposure.
 EXPOSURE = 500_000
+
+# NCore inverts r(θ) by so many steps. Rays may miss a lens by so many pixels.
+_NEWTON_STEPS = 3
+_MOST_MISS = 0.25
 
 # From Blender's camera (y up, looks along −z) to NCore's (y down, looks along z).
 _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -156,9 +165,14 @@ class NCore(ForTraining):
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if isinstance(lens, Equidistant | Rectilinear):
+        if isinstance(lens, KannalaBrandt | FTheta) and (miss := _miss(lens)) > _MOST_MISS:
+            return (
+                f"shows rays that NCore's inverse misses by {miss:.2g} pixels; give it a smaller "
+                "fov, or reproject to equidistant"
+            )
+        if isinstance(lens, Equidistant | Rectilinear | BrownConrady | KannalaBrandt | FTheta):
             return None
-        return "is not an equidistant fisheye or a pinhole; reproject to one of them"
+        return "has a lens that NCore lacks; reproject to rectilinear or equidistant"
 
     def joins(self, lens: Lens, other: Lens) -> bool:
         return True
@@ -224,12 +238,17 @@ def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
         "external_distortion_parameters": None,
     }
     parameters: dict[str, Any]
-    if isinstance(lens, Rectilinear):
+    if isinstance(lens, Rectilinear | BrownConrady):
+        radial, tangential = [0.0] * 6, [0.0] * 2
+        if isinstance(lens, BrownConrady):
+            named = cameras.distortion(lens)
+            radial = [named[f"k{number}"] for number in range(1, 7)]
+            tangential = [named["p1"], named["p2"]]
         parameters = {
             "principal_point": list(lens.center),
             "focal_length": list(cameras.focal_pixels(lens)),
-            "radial_coeffs": [0.0] * 6,
-            "tangential_coeffs": [0.0] * 2,
+            "radial_coeffs": radial,
+            "tangential_coeffs": tangential,
             "thin_prism_coeffs": [0.0] * 4,
         }
         # gsplat does not know NCore's "ideal-pinhole".
@@ -237,6 +256,20 @@ def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
             "camera_model_type": "opencv-pinhole",
             "camera_model_parameters": common | parameters,
         }
+    if isinstance(lens, KannalaBrandt):
+        parameters = {
+            "principal_point": list(lens.center),
+            "focal_length": list(cameras.focal_pixels(lens)),
+            "radial_coeffs": list(lens.coefficients),
+            "max_angle": cameras.largest_angle(lens),
+        }
+        return {
+            "camera_model_type": "opencv-fisheye",
+            "camera_model_parameters": common | parameters,
+        }
+    if isinstance(lens, FTheta):
+        parameters = _ftheta(lens)
+        return {"camera_model_type": "ftheta", "camera_model_parameters": common | parameters}
     if not isinstance(lens, Equidistant):
         raise TypeError(f"{type(lens).__name__} is not a lens of this export")
     pixels_a_radian = lens.height / lens.fov
@@ -251,6 +284,55 @@ def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
         "linear_cde": [lens.width / lens.height, 0.0, 0.0],
     }
     return {"camera_model_type": "ftheta", "camera_model_parameters": common | parameters}
+
+
+def _polynomials(lens: KannalaBrandt | FTheta) -> tuple[Polynomial, Polynomial]:
+    """Return r(θ) in focal lengths, and the θ(r) from which NCore starts Newton's method.
+
+    For OpenCV's fisheye, NCore's start is proportional to r.
+    """
+    largest = cameras.largest_angle(lens)
+    if isinstance(lens, KannalaBrandt):
+        k1, k2, k3, k4 = lens.coefficients
+        fx, fy = cameras.focal_pixels(lens)
+        side = max(lens.width / 2 / fx, lens.height / 2 / fy)
+        return Polynomial([0, 1, 0, k1, 0, k2, 0, k3, 0, k4]), Polynomial([0, largest / side])
+    forward = Polynomial([0, 1, *lens.coefficients])
+    angles = np.linspace(0, largest, 257)[1:]
+    radii = forward(angles)
+    # Without a constant: the axis is at r = 0. The powers of r / r_max are of one size.
+    powers = (radii[:, None] / radii[-1]) ** np.arange(1, 6)
+    fitted, *_ = np.linalg.lstsq(powers, angles, rcond=None)
+    return forward, Polynomial([0, *(fitted / radii[-1] ** np.arange(1, 6))])
+
+
+def _miss(lens: KannalaBrandt | FTheta) -> float:
+    """Return by how many pixels NCore's three steps of Newton's method miss the lens at most."""
+    forward, start = _polynomials(lens)
+    angles = np.linspace(0, cameras.largest_angle(lens), 257)
+    radii = forward(angles)
+    found = start(radii)
+    slope = forward.deriv()
+    with np.errstate(all="ignore"):
+        for _ in range(_NEWTON_STEPS):
+            found = found - (forward(found) - radii) / slope(found)
+        errors = np.abs(found - angles) * max(cameras.focal_pixels(lens))
+    return float(np.max(np.nan_to_num(errors, nan=np.inf)))
+
+
+def _ftheta(lens: FTheta) -> dict[str, Any]:
+    """Return NCore's parameters of an f-theta lens, whose polynomial is NCore's reference."""
+    fx, fy = cameras.focal_pixels(lens)
+    forward, start = _polynomials(lens)
+    return {
+        "principal_point": [lens.center[0] - 0.5, lens.center[1] - 0.5],
+        "reference_poly": "ANGLE_TO_PIXELDIST",
+        # Both have six coefficients, and r in pixels.
+        "pixeldist_to_angle_poly": [k / fy**power for power, k in enumerate(start.coef.tolist())],
+        "angle_to_pixeldist_poly": [fy * k for k in forward.coef.tolist()],
+        "max_angle": cameras.largest_angle(lens),
+        "linear_cde": [fx / fy, 0.0, 0.0],
+    }
 
 
 def _write_poses(store: ZarrStore, streams: Sequence[_Stream]) -> None:

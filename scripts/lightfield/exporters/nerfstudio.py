@@ -14,6 +14,7 @@ and refuses panoramas. Sources: nerfstudio's nerfstudio_dataparser.py and camera
 and formats/nerfstudio.rs of Brush 1.0.
 """
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -26,15 +27,33 @@ from lightfield.export.pictures import write_pictures
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import DepthMaps, SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ForTraining, PointCount
+from lightfield.exporters.base import (
+    NO_DEPTH,
+    TO_RECTILINEAR,
+    ForTraining,
+    PointCount,
+    sideways_refusal,
+)
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
+from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.fisheye624 import Fisheye624
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 POINT_CLOUD = "points.ply"
+_MODELS: dict[type[Lens], str] = {
+    # nerfstudio takes OPENCV without distortion for PINHOLE, which Brush does not read.
+    Rectilinear: "OPENCV",
+    BrownConrady: "OPENCV",
+    Equidistant: "OPENCV_FISHEYE",
+    KannalaBrandt: "OPENCV_FISHEYE",
+    Fisheye624: "FISHEYE624",
+    Equirectangular: "EQUIRECTANGULAR",
+}
 # In metres.
 _DEPTH_UNIT = 0.001
 
@@ -60,28 +79,47 @@ class Nerfstudio(ForTraining):
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if self.splatfacto and not isinstance(lens, Rectilinear):
+        # splatfacto undistorts OPENCV.
+        if self.splatfacto and not isinstance(lens, Rectilinear | BrownConrady):
             return f"would be taken for a pinhole by splatfacto; {TO_RECTILINEAR}"
-        if isinstance(lens, Equidistant | KannalaBrandt):
+        if isinstance(lens, BrownConrady):
+            if cameras.has_denominator(lens):
+                return f"has k4 to k6, which nerfstudio lacks; {TO_RECTILINEAR}"
+        elif isinstance(lens, Fisheye624):
+            if refusal := sideways_refusal(lens, "nerfstudio's FISHEYE624"):
+                return refusal
+        elif isinstance(lens, Equidistant | KannalaBrandt):
             has_pixel_on_axis = lens.center[0] % 1 == 0.5 and lens.center[1] % 1 == 0.5
             if has_pixel_on_axis:
                 return "has a pixel on its optical axis, which is NaN to nerfstudio; use even sizes"
         elif isinstance(lens, Equirectangular):
             if not lens.is_full:
                 return f"is a part of a panorama; nerfstudio takes whole ones; {TO_RECTILINEAR}"
-        elif not isinstance(lens, Rectilinear):
+        elif type(lens) not in _MODELS:
             return f"has a lens that nerfstudio lacks; {TO_RECTILINEAR}, equidistant or a panorama"
         return NO_DEPTH if self.depth and not has_depth else None
 
     def joins(self, lens: Lens, other: Lens) -> bool:
-        # nerfstudio has one camera model for all frames, which have their own parameters.
-        return bool(camera(lens)["camera_model"] == camera(other)["camera_model"])
+        if lens == other:
+            return True
+        # nerfstudio has one camera model for all frames, which have their own parameters. But it
+        # computes all rays of FISHEYE624 with the parameters of one of them.
+        model = _MODELS.get(type(lens))
+        return model == _MODELS.get(type(other)) and model != "FISHEYE624"
 
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write a source's views into ``folder``."""
         source = heads.by_camera(source)
         views = source.lightfield.views
-        meaning = conventional_depth(source.lens)
+        # These rays have length 1 along the axis.
+        has_z_rays = isinstance(source.lens, BrownConrady | Fisheye624)
+        meaning = "z" if has_z_rays else conventional_depth(source.lens)
+        if any(isinstance(lens, BrownConrady) and lens.coefficients[4] for lens in source.lenses):
+            print(
+                f"warning: {source.lightfield.path}: camera: has k3, which Brush leaves out; give "
+                "Brush the export colmap",
+                file=sys.stderr,
+            )
         has_lenses = len(source.lenses) > 1
         masked = any(not source.valid(view).all() for view in views)
         frames = []
@@ -128,20 +166,28 @@ class Nerfstudio(ForTraining):
 
 def camera(lens: Lens) -> dict[str, Any]:
     """Return the keys that describe a lens to nerfstudio."""
+    model = {"camera_model": _MODELS[type(lens)]}
     size = {"w": lens.width, "h": lens.height}
     if isinstance(lens, Equirectangular):
         focal = {"fl_x": lens.width / 2, "fl_y": float(lens.height)}
-        return {"camera_model": "EQUIRECTANGULAR", **focal, **_center(lens), **size}
-    if isinstance(lens, Rectilinear):
-        fx, fy = cameras.focal_pixels(lens)
-        # nerfstudio takes OPENCV without distortion for PINHOLE, which Brush does not read.
-        undistorted = dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
-        focal = {"fl_x": fx, "fl_y": fy}
-        return {"camera_model": "OPENCV", **focal, **_center(lens), **size, **undistorted}
-    fx, fy, *distortion = cameras.opencv_fisheye(lens)
-    named = {f"k{number}": value for number, value in enumerate(distortion, 1)}
+        return {**model, **focal, **_center(lens), **size}
+    assert isinstance(lens, Rectilinear | CalibratedLens | Equidistant)
+    fx, fy = cameras.focal_pixels(lens)
     focal = {"fl_x": fx, "fl_y": fy}
-    return {"camera_model": "OPENCV_FISHEYE", **focal, **_center(lens), **size, **named}
+    return {**model, **focal, **_center(lens), **size, **_distortion(lens)}
+
+
+def _distortion(lens: Lens) -> dict[str, Any]:
+    """Return the keys of a lens's distortion."""
+    if isinstance(lens, Rectilinear):
+        return dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
+    if isinstance(lens, BrownConrady):
+        named = cameras.distortion(lens)
+        return {name: named[name] for name in ("k1", "k2", "k3", "p1", "p2")}
+    if isinstance(lens, Fisheye624):
+        return {"distortion_params": list(lens.coefficients)}
+    _, _, *radial = cameras.opencv_fisheye(lens)
+    return {f"k{number}": value for number, value in enumerate(radial, 1)}
 
 
 def _parameters(lens: Lens) -> dict[str, Any]:

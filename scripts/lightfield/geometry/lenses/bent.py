@@ -135,9 +135,10 @@ class BentLens(CalibratedLens):
             return u, v
         points = np.stack(np.broadcast_arrays(u, v)).astype(np.float64)
         flat = points.reshape(2, -1)
-        for first in range(0, flat.shape[1], BLOCK):
-            block = slice(first, first + BLOCK)
-            flat[:, block] = self._solved(flat[:, block])
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for first in range(0, flat.shape[1], BLOCK):
+                block = slice(first, first + BLOCK)
+                flat[:, block] = self._solved(flat[:, block])
         return points[0].astype(u.dtype), points[1].astype(v.dtype)
 
     def _solved(self, goals: Array) -> Array:

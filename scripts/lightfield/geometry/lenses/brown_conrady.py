@@ -41,8 +41,10 @@ class BrownConrady(BentLens):
     name = "brown_conrady"
     title = "Brown–Conrady lens"
     camera_types = ("BROWN_CONRADY",)
+    focuses_on_plane = True
     coefficient_names = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
     Settings = BrownConradySettings
+    focuses_on_plane = True
     largest_fov = 180.0
 
     fov: float = math.pi

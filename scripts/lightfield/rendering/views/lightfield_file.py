@@ -40,7 +40,8 @@ def write(job: MakeLightfield) -> None:
         assert isinstance(settings.rig, rigs.Path)
         imu.write(job.output.parent, settings.rig, lightfield)
         motion = lightfield.render.camera_motion
-        if motion and settings.rig.imu and settings.rig.imu.exposure:
+        # The camera_motion of a camera on a head is in the camera's axes, not in the body's.
+        if motion and settings.rig.imu and settings.rig.imu.exposure and not settings.rig.mount:
             print(f"note: {imu.exposure_note(settings.rig, motion)}")
     lightfield.write(job.output)
 
