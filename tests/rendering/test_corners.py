@@ -177,6 +177,26 @@ def test_cameras_at_random_places_keep_away_from_a_board(results, run_program, t
     assert (distances < 0.1).any()
 
 
+def test_a_board_with_the_name_of_an_object_is_refused(results, run_program, tmp_path):
+    board = {"type": "chessboard", "squares": [3, 2], "square": 0.1}
+    (tmp_path / "settings.json").write_text(json.dumps({"targets": {"Cube": board}}))
+    blend = results.parents[1] / "work/boards/scene.blend"
+    before = sha256(blend)
+    arguments = ("--blend", blend, "--settings", tmp_path / "settings.json", "--skip-memory")
+    run = run_program(
+        "inventory.py", *arguments, "--output", tmp_path / "inventory.json", check=False
+    )
+    assert run.returncode == 1
+    assert "scene.blend: targets.Cube: the scene has an object Cube" in run.stderr
+    assert "Traceback" not in run.stderr
+    assert not (tmp_path / "inventory.json").exists()
+    (tmp_path / "settings.json").write_text(json.dumps({"targets": {"board": board}}))
+    run_program("inventory.py", *arguments, "--output", tmp_path / "inventory.json")
+    # Two boxes, and the board.
+    assert json.loads((tmp_path / "inventory.json").read_text())["objects"] == 3
+    assert sha256(blend) == before
+
+
 def test_corners_are_published_with_the_dataset(results):
     sums = (results / "charuco/sha256sums.txt").read_text()
     assert f"{sha256(results / 'charuco/corners.json')}  corners.json\n" in sums
