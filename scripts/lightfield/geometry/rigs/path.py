@@ -104,7 +104,8 @@ class Path(CountedRig):
         """Return the motion of the camera with the `imu` at ``times`` (n,) in s.
 
         At `view_times` it has the poses of the views. With stereo, it is between the eyes, with
-        cube_map it looks as the face in front, and with a head it is the body's. Raises `UserError` where the path has no direction.
+        cube_map it looks as the face in front, and with a head it is the body's. Raises `UserError`
+        where the path has no direction.
         """
         from scipy.interpolate import PchipInterpolator
         from scipy.spatial.transform import Rotation, Slerp
