@@ -15,7 +15,7 @@ from oracles.readers import ncore
 from oracles.readers.contents import Exported
 from oracles.readers.ply import read_vertices
 from pydantic import TypeAdapter
-from sphere import LENSES, colour_of, write_views
+from sphere import CALIBRATED, LENSES, colour_of, write_views
 from test_exports import ncore_pixels, on_sphere
 
 from lightfield.configuration.heads import with_cameras
@@ -219,6 +219,28 @@ def test_lenses_that_a_consumer_cannot_mix_are_refused(three, tmp_path):
     for name in ("nerf_synthetic", "lichtfeld", "nerfstudio"):
         with pytest.raises(UserError, match="camera: must be the same as in"):
             exported(three, name, tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "misread", "problem"),
+    [
+        ("colmap", LENSES["perspective"], CALIBRATED["FOV"], "is COLMAP's FOV, which gsplat"),
+        (
+            "nerfstudio",
+            CALIBRATED["OPENCV"],
+            CALIBRATED["OPENCV"] | {"coefficients": [-0.2, 0.05, 0.004, -0.003, 0.01]},
+            "has k3, which Brush leaves out",
+        ),
+    ],
+)
+def test_a_lens_that_is_misread_is_warned_of_by_its_own_file(
+    name, first, misread, problem, tmp_path, capsys
+):
+    folders = datasets(tmp_path, {"first": {"camera": first}, "other": {"camera": misread}})
+    exported(folders, name, tmp_path / name)
+    path = folders["car_other"] / "lightfield.json"
+    (warning,) = (line for line in capsys.readouterr().err.splitlines() if "warning: " in line)
+    assert warning.startswith(f"warning: {path}: camera: {problem}")
 
 
 def test_ncore_has_each_camera_at_the_same_times(two, tmp_path):
