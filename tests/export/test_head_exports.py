@@ -15,6 +15,7 @@ from oracles.readers import ncore
 from oracles.readers.contents import Exported
 from oracles.readers.ply import read_vertices
 from pydantic import TypeAdapter
+from sphere import CALIBRATED as COLMAPS
 from sphere import LENSES, colour_of, write_views
 from test_exports import ncore_pixels, on_sphere
 
@@ -221,6 +222,28 @@ def test_lenses_that_a_consumer_cannot_mix_are_refused(three, tmp_path):
             exported(three, name, tmp_path / name)
 
 
+@pytest.mark.parametrize(
+    ("name", "first", "misread", "problem"),
+    [
+        ("colmap", LENSES["perspective"], COLMAPS["FOV"], "is COLMAP's FOV, which gsplat"),
+        (
+            "nerfstudio",
+            COLMAPS["OPENCV"],
+            COLMAPS["OPENCV"] | {"coefficients": [-0.2, 0.05, 0.004, -0.003, 0.01]},
+            "has k3, which Brush leaves out",
+        ),
+    ],
+)
+def test_a_lens_that_is_misread_is_warned_of_by_its_own_file(
+    name, first, misread, problem, tmp_path, capsys
+):
+    folders = datasets(tmp_path, {"first": {"camera": first}, "other": {"camera": misread}})
+    exported(folders, name, tmp_path / name)
+    path = folders["car_other"] / "lightfield.json"
+    (warning,) = (line for line in capsys.readouterr().err.splitlines() if "warning: " in line)
+    assert warning.startswith(f"warning: {path}: camera: {problem}")
+
+
 def test_ncore_has_each_camera_at_the_same_times(two, tmp_path):
     folder = exported(two, "ncore", tmp_path / "ncore", points=400)
     (entry,) = json.loads((folder / "views.json").read_text())["component_stores"]
@@ -274,8 +297,18 @@ CALIBRATED = {
 }
 
 
-@pytest.mark.parametrize("lens", CALIBRATED)
-def test_a_camchain_is_read_back_as_the_same_lens(lens, tmp_path):
+# The file of an export that has its cameras, and the second one's name there.
+CALIBRATIONS = {"kalibr": ("camchain.yaml", "cam1"), "colmap": ("sparse/0/cameras.bin", 2)}
+
+
+@pytest.mark.parametrize(
+    ("name", "lens"),
+    [
+        *(("kalibr", lens) for lens in CALIBRATED),
+        *(("colmap", lens) for lens in CALIBRATED if lens != "double_sphere"),
+    ],
+)
+def test_an_exports_camera_is_read_back_as_the_same_lens(name, lens, tmp_path):
     camera = {
         "lens": lens,
         "fov": 80,
@@ -286,9 +319,10 @@ def test_a_camchain_is_read_back_as_the_same_lens(lens, tmp_path):
         **CALIBRATED[lens],
     }
     head = {"left": {"camera": camera}, "right": {"camera": camera, "position": [0.1, 0, 0]}}
-    folder = exported(datasets(tmp_path, head), "kalibr", tmp_path / "kalibr")
+    folder = exported(datasets(tmp_path, head), name, tmp_path / name)
     expected = lenses.from_camera(camera)
-    found = calibrations.read(folder / "camchain.yaml", "cam1", fov=np.radians(80))
+    file, number = CALIBRATIONS[name]
+    found = calibrations.read(folder / file, number, fov=np.radians(80))
     points = np.random.default_rng(3).normal(size=(200, 3)) * [0.5, 0.5, 0.1] - [0, 0, 2]
     pixels = expected.pixels(points)
     assert expected.in_frame(pixels).sum() > 50

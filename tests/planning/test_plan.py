@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import yaml
 from checkouts import checkout, planned, snakemake
 
 from lightfield.configuration.config_file import Energy
@@ -269,6 +270,17 @@ reprojections:
     coefficients: [-0.172, 0.593]}, format: png}
   chosen: {camera: {<<: *camera, fov: 252}, format: png}
 """
+
+
+def test_a_reprojection_through_the_rigs_own_lens_repeats_no_warning(tmp_path):
+    settings = yaml.safe_load(CLIPPED)
+    settings["rigs"]["LFPlane"]["camera"] = settings["reprojections"]["sphere"]["camera"]
+    settings["reprojections"] = {"png": {"format": "png"}}
+    folder = checkout(tmp_path, clipped=yaml.safe_dump(settings))
+    plan = snakemake(folder, "-n", "--config", "scenes=[clipped]", "preset=full", "rigs=all")
+    assert plan.returncode == 0, plan.stderr
+    (warning,) = (line for line in plan.stderr.splitlines() if line.startswith("warning"))
+    assert warning.startswith("warning: clipped/LFPlane: the double-sphere fisheye ends at ")
 
 
 def test_a_lens_that_ends_inside_its_image_is_a_warning_that_names_fov(tmp_path):

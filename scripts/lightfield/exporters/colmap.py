@@ -124,9 +124,9 @@ class ColmapModel(ForTraining):
 
     def write_model(self, source: SourceDataset, folder: Path) -> None:
         """Write the model of a source's views into ``folder``."""
-        for lens in source.lenses:
+        for lens, path in source.lenses.items():
             if problem := misreading(lens):
-                print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
+                print(f"warning: {path}: camera: {problem}", file=sys.stderr)
         views = source.lightfield.views
         if any(view.split for view in views):
             tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]

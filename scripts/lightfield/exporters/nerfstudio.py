@@ -114,12 +114,13 @@ class Nerfstudio(ForTraining):
         # These rays have length 1 along the axis.
         has_z_rays = isinstance(source.lens, BrownConrady | Fisheye624)
         meaning = "z" if has_z_rays else conventional_depth(source.lens)
-        if any(isinstance(lens, BrownConrady) and lens.coefficients[4] for lens in source.lenses):
-            print(
-                f"warning: {source.lightfield.path}: camera: has k3, which Brush leaves out; give "
-                "Brush the export colmap",
-                file=sys.stderr,
-            )
+        for lens, path in source.lenses.items():
+            if isinstance(lens, BrownConrady) and lens.coefficients[4]:
+                print(
+                    f"warning: {path}: camera: has k3, which Brush leaves out; give Brush the "
+                    "export colmap",
+                    file=sys.stderr,
+                )
         has_lenses = len(source.lenses) > 1
         masked = any(not source.valid(view).all() for view in views)
         frames = []

@@ -198,7 +198,8 @@ class StartChecks:
     def _lenses(self) -> tuple[dict[str, Lens], set[str]]:
         """Return the lenses of the planned views, by the names of their datasets.
 
-        Also returns the names of the datasets that are rendered.
+        Also returns the names of the datasets that are rendered. Reprojections through the rig's
+        own lens are left out.
         """
         run, lenses, rendered = self._run, dict[str, Lens](), set[str]()
         for planned in self._plan.planned_jobs():
@@ -212,7 +213,9 @@ class StartChecks:
                     rendered.add(dataset.sequence_name)
             elif reprojection := run.asked(run.build.reprojection, planned.names):
                 name = f"{dataset.sequence_name}/{planned.names['reprojection']}"
-                lenses[name] = reprojection.lens(lens)
+                target = reprojection.lens(lens)
+                if target != lens:
+                    lenses[name] = target
         return lenses, rendered
 
     def _check_times(self) -> None:
