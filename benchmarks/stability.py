@@ -31,7 +31,7 @@ import numpy as np
 
 try:
     import mpmath
-    from mpmath import asin, atan, atan2, cos, hypot, mpf, pi, sin, tan
+    from mpmath import acos, asin, atan, atan2, cos, hypot, mpf, pi, sin, sqrt, tan
 except ModuleNotFoundError:
     sys.exit("error: mpmath is missing: set it up with `make .venv/complete-for-tests`")
 
@@ -43,6 +43,8 @@ from lightfield.core.files import write_csv, write_text
 from lightfield.core.progress import Progress
 from lightfield.geometry.lenses import LENSES, Array, Lens
 from lightfield.geometry.lenses.base import CircleFisheye
+from lightfield.geometry.lenses.bent import BentLens
+from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.imaging.plots import BLUE, VERMILION, plot
 
 # Roundings, each of one eps, in the longest chain of operations of one step.
@@ -77,7 +79,9 @@ def angles(lens: Any) -> tuple[int, list[mpf]]:
 
 
 def radii(lens: Any) -> list[mpf]:
-    """Return the coefficients of a Kannala–Brandt lens's r / f over θ; even powers have none."""
+    """Return the coefficients of a lens's r / f over θ, from the constant upwards."""
+    if lens.name == "f_theta":
+        return [mpf(0), mpf(1), *map(mpf, lens.coefficients)]
     coefficients = []
     for k in (1, *lens.coefficients):
         coefficients += [mpf(0), mpf(k)]
@@ -135,6 +139,162 @@ def orthographic_angle(lens: Any, r: mpf) -> mpf | None:
     return asin(sine) if sine <= 1 else None
 
 
+# The lenses of calibrated cameras, as they are published, with r in focal lengths. Each has θ at r,
+# r at θ, and the largest θ, whose r may be infinite.
+
+
+class Division:
+    """Fitzgibbon: tan θ = r / (1 + k r²)."""
+
+    def __init__(self, lens: Any) -> None:
+        self.k = mpf(lens.coefficients[0])
+
+    def angle(self, r: mpf) -> mpf:
+        return atan2(r, 1 + self.k * r * r)
+
+    def radius(self, t: mpf) -> mpf:
+        # The smallest positive root of k r² sin θ − r cos θ + sin θ.
+        root = sqrt(cos(t) ** 2 - 4 * self.k * sin(t) ** 2)
+        return (cos(t) - root) / (2 * self.k * sin(t)) if t else mpf(0)
+
+    @functools.cached_property
+    def last(self) -> tuple[mpf, mpf]:
+        if self.k < 0:
+            return +pi, INF
+        return atan(1 / (2 * sqrt(self.k))), 1 / sqrt(self.k)
+
+
+class FovModel:
+    """Devernay and Faugeras: r = atan(2 tan θ tan(ω / 2)) / ω."""
+
+    def __init__(self, lens: Any) -> None:
+        self.omega = mpf(lens.coefficients[0])
+
+    def angle(self, r: mpf) -> mpf:
+        return atan(tan(r * self.omega) / (2 * tan(self.omega / 2)))
+
+    def radius(self, t: mpf) -> mpf:
+        return atan(2 * tan(t) * tan(self.omega / 2)) / self.omega
+
+    @functools.cached_property
+    def last(self) -> tuple[mpf, mpf]:
+        return pi / 2, pi / (2 * self.omega)
+
+
+class Unified:
+    """Mei and Rives: r = sin θ / (cos θ + ξ), and their inverse."""
+
+    def __init__(self, lens: Any) -> None:
+        self.xi = mpf(lens.coefficients[0])
+
+    def angle(self, r: mpf) -> mpf:
+        factor = (self.xi + sqrt(1 + (1 - self.xi**2) * r * r)) / (1 + r * r)
+        return atan2(factor * r, factor - self.xi)
+
+    def radius(self, t: mpf) -> mpf:
+        return sin(t) / (cos(t) + self.xi)
+
+    @functools.cached_property
+    def last(self) -> tuple[mpf, mpf]:
+        if self.xi > 1:
+            return acos(-1 / self.xi), 1 / sqrt(self.xi**2 - 1)
+        return acos(-self.xi), INF
+
+
+class ExtendedUnified:
+    """Khomutenko et al.: r = sin θ / (α d + (1 − α) cos θ), and their inverse."""
+
+    def __init__(self, lens: Any) -> None:
+        self.alpha, self.beta = map(mpf, lens.coefficients)
+
+    def angle(self, r: mpf) -> mpf:
+        alpha, beta = self.alpha, self.beta
+        root = sqrt(1 - (2 * alpha - 1) * beta * r * r)
+        return atan2(r, (1 - beta * alpha**2 * r * r) / (alpha * root + 1 - alpha))
+
+    def radius(self, t: mpf) -> mpf:
+        d = sqrt(self.beta * sin(t) ** 2 + cos(t) ** 2)
+        return sin(t) / (self.alpha * d + (1 - self.alpha) * cos(t))
+
+    @functools.cached_property
+    def last(self) -> tuple[mpf, mpf]:
+        # cos θ = −w d = −w √(β sin² θ + cos² θ)
+        w = self.alpha / (1 - self.alpha)
+        if self.alpha > 0.5:
+            w = 1 / w
+        theta = atan2(sqrt(1 - w * w), -w * sqrt(self.beta))
+        return theta, 1 / sqrt(self.beta * (2 * self.alpha - 1)) if self.alpha > 0.5 else INF
+
+
+class DoubleSphere:
+    """Usenko et al.: r = sin θ / (α d2 + (1 − α)(ξ + cos θ)), and their inverse."""
+
+    def __init__(self, lens: Any) -> None:
+        self.xi, self.alpha = map(mpf, lens.coefficients)
+
+    def angle(self, r: mpf) -> mpf:
+        xi, alpha = self.xi, self.alpha
+        z = (1 - alpha**2 * r * r) / (alpha * sqrt(1 - (2 * alpha - 1) * r * r) + 1 - alpha)
+        factor = (z * xi + sqrt(z * z + (1 - xi**2) * r * r)) / (z * z + r * r)
+        return atan2(factor * r, factor * z - xi)
+
+    def divisor(self, t: mpf) -> mpf:
+        d2 = sqrt(sin(t) ** 2 + (self.xi + cos(t)) ** 2)
+        return self.alpha * d2 + (1 - self.alpha) * (self.xi + cos(t))
+
+    def radius(self, t: mpf) -> mpf:
+        return sin(t) / self.divisor(t)
+
+    @functools.cached_property
+    def last(self) -> tuple[mpf, mpf]:
+        # The paper's w2 is a little less than the θ at which r stops growing.
+        if self.alpha > 0.5:
+            r = 1 / sqrt(2 * self.alpha - 1)
+            return self.angle(r), r
+        return mpmath.findroot(self.divisor, (mpf(0), +pi), "anderson", maxsteps=300), INF
+
+
+PUBLISHED: dict[str, type[Any]] = {
+    "division": Division,
+    "fov_model": FovModel,
+    "unified": Unified,
+    "extended_unified": ExtendedUnified,
+    "double_sphere": DoubleSphere,
+}
+
+
+@functools.cache
+def published(lens: Any) -> Any:
+    """Return the published model of a lens."""
+    return PUBLISHED[lens.name](lens)
+
+
+def published_angle(lens: Any, r: mpf) -> mpf | None:
+    """Return θ at r, in mm, of a lens that is published with its inverse."""
+    model = published(lens)
+    r = r / lens.focal_length
+    return model.angle(r) if r <= model.last[1] else None
+
+
+def published_radius(lens: Any, theta: mpf) -> mpf | None:
+    """Return r, in mm, at θ, of a lens that is published with its inverse."""
+    model = published(lens)
+    last, r = model.last
+    if theta == last:
+        return None if r == INF else lens.focal_length * r
+    return lens.focal_length * model.radius(theta) if theta < last else None
+
+
+def polynomial_of_angle(lens: Any, theta: mpf) -> mpf | None:
+    """Return r, in mm, at θ, of a lens whose r is a polynomial of θ."""
+    return lens.focal_length * value(radii(lens), theta) if theta <= rise(lens) else None
+
+
+def angle_of_polynomial(lens: Any, r: mpf) -> mpf | None:
+    """Return θ at r, in mm, of a lens whose r is a polynomial of θ."""
+    return inverse(radii(lens), r / lens.focal_length, rise(lens))
+
+
 # θ at r, and r at θ, each None if missing; r as in the lenses' own definitions.
 RADIAL: dict[str, tuple[Callable[[Any, mpf], mpf | None], Callable[[Any, mpf], mpf | None]]] = {
     "rectilinear": (
@@ -161,10 +321,8 @@ RADIAL: dict[str, tuple[Callable[[Any, mpf], mpf | None], Callable[[Any, mpf], m
         lambda lens, r: angles(lens)[0] * value(angles(lens)[1], r),
         polynomial_radius,
     ),
-    "kannala_brandt": (
-        lambda lens, r: inverse(radii(lens), r / lens.focal_length, rise(lens)),
-        lambda lens, t: lens.focal_length * value(radii(lens), t) if t <= rise(lens) else None,
-    ),
+    **dict.fromkeys(("kannala_brandt", "f_theta"), (angle_of_polynomial, polynomial_of_angle)),
+    **dict.fromkeys(PUBLISHED, (published_angle, published_radius)),
 }
 
 
@@ -182,9 +340,221 @@ def largest_radius(lens: Any) -> mpf:
     last = half_fov(lens)
     if lens.name == "polynomial":
         last = min(last, value(angles(lens)[1], rise(lens)))
-    elif lens.name == "kannala_brandt":
+    elif lens.name in ("kannala_brandt", "f_theta"):
         last = min(last, rise(lens))
+    elif lens.name in PUBLISHED:
+        end, r = published(lens).last
+        if float(last) >= float(end):
+            return r * lens.focal_length
     return abs(RADIAL[lens.name][1](lens, last))
+
+
+# The lenses that are not quite radial, as they are published, with y down.
+
+
+class BrownConrady:
+    """OpenCV's projectPoints. Its plane is that of tan θ."""
+
+    def __init__(self, lens: Any) -> None:
+        self.k1, self.k2, self.p1, self.p2, *self.others = map(mpf, lens.coefficients)
+        self.last = tan(mpf(lens.fov) / 2) if lens.fov < math.pi else mpf(math.tan(math.pi / 2))
+
+    def place(self, theta: mpf) -> mpf | None:
+        return tan(theta) if theta < pi / 2 else None
+
+    def angle(self, t: mpf) -> mpf:
+        return atan(t)
+
+    def radius(self, t: mpf) -> mpf:
+        q = t * t
+        k3, k4, k5, k6 = self.others
+        above = 1 + self.k1 * q + self.k2 * q**2 + k3 * q**3
+        return t * above / (1 + k4 * q + k5 * q**2 + k6 * q**3)
+
+    def bend(self, x: mpf, y: mpf) -> Vector:
+        q = x * x + y * y
+        return (
+            2 * self.p1 * x * y + self.p2 * (q + 2 * x * x),
+            self.p1 * (q + 2 * y * y) + 2 * self.p2 * x * y,
+        )
+
+    def steepest(self, t: mpf) -> mpf:
+        return 6 * t * hypot(self.p1, self.p2)
+
+
+class ThinPrismFisheye:
+    """COLMAP's THIN_PRISM_FISHEYE. Its plane is that of θ."""
+
+    def __init__(self, lens: Any) -> None:
+        self.k1, self.k2, self.p1, self.p2, self.k3, self.k4, *self.s = map(mpf, lens.coefficients)
+        self.last = half_fov(lens)
+
+    def place(self, theta: mpf) -> mpf | None:
+        return theta
+
+    def angle(self, t: mpf) -> mpf:
+        return t
+
+    def radius(self, t: mpf) -> mpf:
+        q = t * t
+        return t * (1 + self.k1 * q + self.k2 * q**2 + self.k3 * q**3 + self.k4 * q**4)
+
+    def bend(self, x: mpf, y: mpf) -> Vector:
+        q = x * x + y * y
+        return (
+            2 * self.p1 * x * y + self.p2 * (q + 2 * x * x) + self.s[0] * q,
+            2 * self.p2 * x * y + self.p1 * (q + 2 * y * y) + self.s[1] * q,
+        )
+
+    def steepest(self, t: mpf) -> mpf:
+        return 6 * t * hypot(self.p1, self.p2) + 2 * t * hypot(*self.s)
+
+
+class Fisheye624:
+    """Project Aria's FisheyeRadTanThinPrism. Its plane is that of r."""
+
+    def __init__(self, lens: Any) -> None:
+        *self.k, self.p0, self.p1, self.s0, self.s1, self.s2, self.s3 = map(mpf, lens.coefficients)
+        self.terms = [mpf(0), mpf(1)]
+        for k in self.k:
+            self.terms += [mpf(0), k]
+        ends = positive_roots([i * c for i, c in enumerate(self.terms)][1:])
+        self.rim = min([*ends, half_fov(lens)])
+        self.last = value(self.terms, self.rim)
+
+    def place(self, theta: mpf) -> mpf | None:
+        return value(self.terms, theta) if theta <= self.rim else None
+
+    def angle(self, t: mpf) -> mpf:
+        return inverse(self.terms, min(t, self.last), self.rim)
+
+    def radius(self, t: mpf) -> mpf:
+        return t
+
+    def bend(self, x: mpf, y: mpf) -> Vector:
+        q = x * x + y * y
+        return (
+            self.p0 * (q + 2 * x * x) + 2 * self.p1 * x * y + self.s0 * q + self.s1 * q * q,
+            self.p1 * (q + 2 * y * y) + 2 * self.p0 * x * y + self.s2 * q + self.s3 * q * q,
+        )
+
+    def steepest(self, t: mpf) -> mpf:
+        prism = hypot(self.s0 + 2 * self.s1 * t * t, self.s2 + 2 * self.s3 * t * t)
+        return 6 * t * hypot(self.p0, self.p1) + 2 * t * prism
+
+
+BENT: dict[str, type[Any]] = {
+    "brown_conrady": BrownConrady,
+    "thin_prism_fisheye": ThinPrismFisheye,
+    "fisheye624": Fisheye624,
+}
+
+
+@functools.cache
+def bent(lens: Any) -> Any:
+    """Return the published model of a lens that is not quite radial."""
+    return BENT[lens.name](lens)
+
+
+@functools.cache
+def largest_place(lens: Any) -> mpf:
+    """Return the t at which the image of a bent lens may fold, or its last."""
+    model = bent(lens)
+
+    def spread(t: mpf) -> mpf:
+        slope = mpmath.diff(model.radius, t)
+        return min(slope, model.radius(t) / t) - model.steepest(t)
+
+    places = [mpf(t) for t in np.sinh(np.linspace(0, math.asinh(model.last), 513))[1:-1]]
+    places.append(model.last)
+    folded = next((i for i, t in enumerate(places) if spread(t) <= 0), None)
+    if folded is None:
+        return model.last
+    low = places[folded - 1] if folded else TINY
+    return mpmath.findroot(spread, (low, places[folded]), "anderson", maxsteps=300, verify=False)
+
+
+def bent_image(lens: Any, x: mpf, y: mpf) -> Vector:
+    """Return where a bent lens shows a place in its plane: in focal lengths, y down."""
+    t = hypot(x, y)
+    ratio = bent(lens).radius(t) / t if t else mpf(1)
+    return tuple(ratio * c + d for c, d in zip((x, y), bent(lens).bend(x, y), strict=True))
+
+
+def missing(lens: Any, goal: Vector, place: Vector) -> Vector:
+    """Return how far the image of a place in a bent lens's plane is from its goal."""
+    return tuple(a - b for a, b in zip(goal, bent_image(lens, *place), strict=True))
+
+
+def bent_place(lens: Any, goal: Vector) -> Vector | None:
+    """Return the place within a bent lens that it shows at ``goal``, in focal lengths.
+
+    Newton's method, from the axis. Steps that leave the lens or bring no gain are shortened.
+    """
+    x, y = mpf(0), mpf(0)
+    offset = missing(lens, goal, (x, y))
+    for _ in range(200):
+        if mpmath.norm(offset) <= TINY**1.5 * mpmath.norm(goal):
+            return x, y
+        right = [
+            (a - b) / STEP for a, b in zip(offset, missing(lens, goal, (x + STEP, y)), strict=True)
+        ]
+        down = [
+            (a - b) / STEP for a, b in zip(offset, missing(lens, goal, (x, y + STEP)), strict=True)
+        ]
+        determinant = right[0] * down[1] - right[1] * down[0]
+        dx = (offset[0] * down[1] - offset[1] * down[0]) / determinant
+        dy = (right[0] * offset[1] - right[1] * offset[0]) / determinant
+        for halvings in range(60):
+            new = x + dx / 2**halvings, y + dy / 2**halvings
+            rest = missing(lens, goal, new)
+            is_inside = hypot(*new) <= largest_place(lens) * (1 + TINY)
+            if is_inside and mpmath.norm(rest) < mpmath.norm(offset):
+                break
+        else:
+            return None
+        (x, y), offset = new, rest
+    return None
+
+
+def bent_rim(lens: Any, goal: Vector) -> mpf:
+    """Return the distance of a bent lens's rim from its centre in the direction of ``goal``."""
+    azimuth = atan2(goal[1], goal[0])
+    for _ in range(60):
+        t = largest_place(lens)
+        x, y = bent_image(lens, t * cos(azimuth), t * sin(azimuth))
+        azimuth += atan2(goal[1] * x - goal[0] * y, goal[0] * x + goal[1] * y)
+    return hypot(x, y)
+
+
+def bent_ray_and_excess(lens: Any, goal: Vector) -> tuple[Vector | None, mpf]:
+    """Return the exact ray of a bent lens's image in focal lengths, and how far it lies outside."""
+    place = bent_place(lens, goal)
+    if place is None:
+        return None, hypot(*goal) / bent_rim(lens, goal) - 1
+    t = hypot(*place)
+    model = bent(lens)
+    excess = model.radius(t) / model.radius(largest_place(lens)) - 1
+    theta = model.angle(t)
+    right, down = (c / t for c in place) if t else (mpf(0), mpf(0))
+    return (sin(theta) * right, -sin(theta) * down, -cos(theta)), excess
+
+
+def bent_place_and_excess(lens: Any, ray: Vector) -> tuple[Vector | None, mpf]:
+    """Return the exact place of a ray in a bent lens's plane, and how far it lies outside."""
+    side = hypot(ray[0], ray[1])
+    model = bent(lens)
+    t = model.place(atan2(side, -ray[2]))
+    if t is None or t > largest_place(lens) * (1 + TINY):
+        return None, mpf(1)
+    place = (t * ray[0] / side, -t * ray[1] / side) if side else (mpf(0), mpf(0))
+    return place, model.radius(t) / model.radius(largest_place(lens)) - 1
+
+
+def bent_pixel(lens: Any, x: mpf, y: mpf) -> Vector:
+    """Return the pixel of a place in a bent lens's plane."""
+    sides = zip(lens.center, bent_image(lens, x, y), pixel_size(lens), strict=True)
+    return tuple(m + c * lens.focal_length / size for m, c, size in sides)
 
 
 # The right, up and forward axes of faces f b l r u d.
@@ -216,6 +586,8 @@ def ray_and_excess(lens: Any, x: mpf, y: mpf) -> tuple[Vector | None, mpf]:
         return ray, abs(latitude) / (pi / 2) - 1
     u = (x - lens.center[0]) * pixel_size(lens)[0]
     v = (lens.center[1] - y) * pixel_size(lens)[1]
+    if lens.name in BENT:
+        return bent_ray_and_excess(lens, (u / lens.focal_length, -v / lens.focal_length))
     r = hypot(u, v)
     theta = RADIAL[lens.name][0](lens, r)
     excess = r / largest_radius(lens) - 1
@@ -241,6 +613,9 @@ def pixel_and_excess(lens: Any, ray: Vector) -> tuple[Vector | None, mpf]:
         longitude -= 2 * pi * mpmath.floor((longitude - middle) / (2 * pi) + 0.5)
         x = (longitude - west) / (mpf(east) - west) * lens.width
         return (x, (north - latitude) / (mpf(north) - south) * lens.height), mpf(-1)
+    if lens.name in BENT:
+        place, excess = bent_place_and_excess(lens, ray)
+        return place and bent_pixel(lens, *place), excess
     side = hypot(ray[0], ray[1])
     r = RADIAL[lens.name][1](lens, atan2(side, -ray[2]))
     if r is None:
@@ -530,6 +905,23 @@ def extreme_lenses() -> dict[str, Lens]:
         "polynomial turned 220°": wide | {"coefficients": (0, 0.08, 1e-4, 1e-5, 0), "fov": 220},
         "kannala_brandt 360°": wide | {"coefficients": (0.01, -0.002, 3e-4, 0), "focal_length": 6},
         "kannala_brandt turning": odd | {"coefficients": (-0.3, 0, 0, 0), "focal_length": 12},
+        "division barrel": odd | {"coefficients": (-0.35,), "focal_length": 6},
+        "division turning": wide | {"coefficients": (0.3,), "focal_length": 12},
+        "fov_model": shifted | {"coefficients": (0.93,), "focal_length": 9},
+        "fov_model 3.1": wide | {"coefficients": (3.1,), "focal_length": 20},
+        "unified 0.9": odd | {"coefficients": (0.9,), "focal_length": 12},
+        "unified turning": wide | {"coefficients": (1e3,), "focal_length": 12e3},
+        "extended_unified turning": wide | {"coefficients": (0.63, 1.02), "focal_length": 6},
+        "extended_unified 0.3": odd | {"coefficients": (0.3, 100.0), "focal_length": 12},
+        "double_sphere turning": wide | {"coefficients": (-0.17, 0.59), "focal_length": 6},
+        "double_sphere 0.999": odd | {"coefficients": (0.999, 0.3), "focal_length": 6},
+        "f_theta turning": wide | {"coefficients": (-0.1, 0, 0, -1e-3), "focal_length": 9},
+        "brown_conrady turning": wide | {"coefficients": TURNING, "focal_length": 17},
+        "brown_conrady rational": odd | {"coefficients": RATIONAL, "focal_length": 9},
+        "thin_prism_fisheye 360°": wide | {"coefficients": THIN_PRISM, "focal_length": 6},
+        "thin_prism_fisheye turning": odd | {"coefficients": STRONG_PRISM, "focal_length": 9},
+        "fisheye624 turning": wide | {"coefficients": ARIAS, "focal_length": 12},
+        "fisheye624 folding": shifted | {"coefficients": FOLDING, "focal_length": 12},
         "equirectangular": wide,
         "equirectangular odd": odd,
         "equirectangular 0.01°": wide | dict.fromkeys(("longitude", "latitude"), CORNER),
@@ -547,6 +939,26 @@ def extreme_lenses() -> dict[str, Lens]:
 
 BLENDERS = (-1.1735144e-05, -0.01998874, -3.3525323e-06, 3.0992753e-06, -2.6064646e-08)
 CORNER = (0, math.radians(0.01))
+TURNING = (-0.25, 0.09, 1e-3, -8e-4, -0.014, 0, 0, 0)
+RATIONAL = (8.1, 4.2, 1e-3, -8e-4, 0.2, 8.4, 6.1, 1.0)
+THIN_PRISM = (-0.01, 0.03, 2e-3, -1e-3, -0.02, 0.003, 3e-3, -2e-3)
+STRONG_PRISM = (-0.2, 0.0, 0.02, -0.03, 0.0, 0.0, 0.04, 0.02)
+# A SLAM camera of Project Aria's glasses, and a lens whose prism alone folds its image.
+ARIAS = (
+    -0.027,
+    0.102,
+    -0.072,
+    0.0125,
+    1.24e-3,
+    -4.15e-4,
+    5.5e-4,
+    5.8e-4,
+    -1.2e-3,
+    -4e-4,
+    -6e-4,
+    1e-5,
+)
+FOLDING = (0, 0, 0, 0, 0, 0, 0.01, -0.02, 0.05, 0.02, -0.1, 0.01)
 
 
 def focal(fov: float) -> dict[str, float]:
@@ -575,7 +987,12 @@ def places(lens: Lens) -> Array:
         (0.77 * width, 0.21 * height),
         (0, 0.4 * height),
     ]
-    if lens.name in ("polynomial", "kannala_brandt"):
+    if isinstance(lens, BentLens):
+        t = largest_place(lens)
+        rim = [(t, 0), (t * (1 - 1e-4), 0), (0, -t * (1 - 1e-6))]
+        points += [tuple(map(float, bent_pixel(lens, mpf(u), mpf(v)))) for u, v in rim]
+    turns = lens.name == "polynomial" or isinstance(lens, CalibratedLens)
+    if turns and not isinstance(lens, BentLens) and largest_radius(lens) < INF:
         end = float(largest_radius(lens) / pixel_size(lens)[0])
         points += [
             (x + end, y),

@@ -3,8 +3,8 @@
 A thread writes a view while the next is rendered. So the seconds of both add up to more than those
 of the whole.
 
-It takes the flags of scripts/render_shard.py, and writes --times besides. With --osl, an OSL shader
-of the equidistant lens takes the place of Cycles' own camera. Of the GPUs, only OptiX can do that.
+It takes the flags of scripts/render_shard.py, and writes --times besides. With --osl, the shader
+of the lens takes the place of Cycles' own camera. Of the GPUs, only OptiX can do that.
 benchmarks/gpu.py starts it.
 """
 
@@ -27,31 +27,11 @@ from lightfield.core.files import write_json
 from lightfield.engine.flags import program
 from lightfield.engine.stage import option, writes
 from lightfield.formats.lightfield import LightField
-from lightfield.geometry.lenses import Lens
-from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.base import RadialLens
 from lightfield.imaging import images
 from lightfield.rendering.views import shard
 from lightfield.stages.views import RenderShard
 from lightfield.workflow import shard_log
-
-# The camera of the shader looks along +Z, and +Y is up. The corners of the raster are 0 and 1.
-# Pixels without throughput see nothing.
-SHADER = """
-shader equidistant(
-    output point position = 0, output vector direction = 0, output color throughput = 0)
-{{
-    point raster = camera_shader_raster_position();
-    float x = 2 * raster[0] - 1;
-    float y = 2 * raster[1] - 1;
-    float r = hypot(x, y);
-    if (r <= 1) {{
-        float theta = r * {half_fov!r};
-        float scale = r > 0 ? sin(theta) / r : 0;
-        direction = vector(scale * x, scale * y, cos(theta));
-        throughput = 1;
-    }}
-}}
-"""
 
 # The functions whose seconds are steps of their own. A step inside another one counts once.
 STEPS = {
@@ -166,34 +146,19 @@ def change_set_up(cycles: Any, job: TimedShard, clock: Clock) -> None:
     def set_up(*arguments: Any) -> Any:
         import bpy
 
+        from lightfield.rendering.setup import lens_shader
+
         opened = function(*arguments)
+        if job.osl:
+            if not isinstance(lens, RadialLens):
+                raise UserError(f"--osl: no shader renders a {lens.title}")
+            lens_shader.see_through(bpy.context.scene.camera.data, lens)
         # Opening a scene has removed earlier handlers.
         watch_blender(clock)
         bpy.context.scene.cycles.denoising_use_gpu = job.denoise_on_gpu
-        if job.osl:
-            see_through_shader(bpy.context.scene.camera.data, lens)
         return opened
 
     cycles.set_up = set_up
-
-
-def see_through_shader(camera: Any, lens: Lens) -> None:
-    """Make a camera of Blender see through the shader of an equidistant ``lens``."""
-    import bpy
-
-    if not isinstance(lens, Equidistant) or lens.principal_point:
-        raise UserError(f"--osl: is for a centred equidistant lens, not for a {lens.title}")
-    # Blender compiles shaders with a module of its own Python. It stands last: other packages there
-    # have other versions.
-    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
-    sys.path.append(f"{bpy.utils.resource_path('LOCAL')}/python/lib/{version}/site-packages")
-    text = bpy.data.texts.new("equidistant")
-    text.write(SHADER.format(half_fov=lens.fov / 2))
-    camera.type = "CUSTOM"
-    camera.custom_mode = "INTERNAL"
-    camera.custom_shader = text
-    if not camera.custom_bytecode:
-        raise UserError("--osl: Blender cannot compile the shader")
 
 
 def watch_start() -> list[Mapping[str, Any]]:

@@ -37,10 +37,11 @@ from lightfield.core.units import limit
 from lightfield.exporters import EXPORTERS, SEQUENCE_EXPORTS, Exports
 from lightfield.exporters.base import Developed, Export, ForTraining
 from lightfield.formats import render_block, sensors
-from lightfield.geometry import rigs
+from lightfield.geometry import boards, inertia, rigs
 from lightfield.geometry.lenses import LENSES
+from lightfield.geometry.lenses.calibration_settings import CalibrationSettings
 from lightfield.geometry.lenses.rectilinear import FileSettings
-from lightfield.geometry.rigs import path, rig, split_setting
+from lightfield.geometry.rigs import mount, path, rig, split_setting
 from lightfield.settings.base import MEANINGS
 
 PROGRAMS = ROOT / "scripts"
@@ -110,6 +111,7 @@ RIG_MODELS = _models(rigs.AnyRig)
 LENS_MODELS: list[type[BaseModel]] = [
     *[lens.Settings for lens in LENSES.values() if lens.Settings],
     FileSettings,
+    CalibrationSettings,
 ]
 
 # The pages of keys, by the names of their files.
@@ -134,6 +136,11 @@ KEY_PAGES: dict[str, Page] = {
             Section("scene", scene_source.SceneSource, scene_source.ModelOptions),
             Section("scene: of a model", scene_source.ModelOptions),
             Section("scene: parameters", scene_source.Parameters),
+            Section("scene: targets: all boards", boards.Board),
+            *[
+                Section(f"scene: targets: {_literal(model, 'type')}", model, boards.Board)
+                for model in _models(boards.AnyBoard)
+            ],
             Section("flow", scene_blocks.Flow),
             Section("mesh", scene_blocks.MeshFiles),
             Section("video", scene_blocks.Video),
@@ -172,6 +179,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("All rigs", rig.Rig),
             Section("frames", rig.Frames),
             Section("stereo", rig.Stereo),
+            Section("A camera of a head", mount.HeadCamera),
             Section("split", split_setting.Chosen),
         ],
     ),
@@ -185,6 +193,7 @@ KEY_PAGES: dict[str, Page] = {
         [
             *[Section(_literal(model, "type"), model, rig.Rig) for model in RIG_MODELS],
             Section("A key of a path", path.Key),
+            Section("The imu of a path", inertia.Imu),
         ],
     ),
     "camera-keys.md": Page(
@@ -242,12 +251,21 @@ KEY_PAGES: dict[str, Page] = {
 PROGRAM_GROUPS = {
     "Prepare a scene": [
         "new_scene", "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
-        "make_lightfield", "free_places", "check_cameras", "import_views",
+        "make_lightfield", "free_places", "check_cameras", "corners", "import_views",
     ],
     "Build a family": ["build_members", "corpus", "count_members", "prune"],
     "Render": ["check_device", "probe", "calibrate", "render_shard"],
     "Reproject": ["lens_map", "reproject"],
-    "Export": ["flow", "surface", "splits", "export", "export_instant_ngp", "synthesize", "video"],
+    "Export": [
+        "flow",
+        "surface",
+        "splits",
+        "heads",
+        "export",
+        "export_instant_ngp",
+        "synthesize",
+        "video",
+    ],
     "Publish and fetch": ["publish_checksums", "package", "publish", "take_dataset"],
     "Check": ["validate", "validate_sequence", "verify", "diff", "status"],
     "Report": [
@@ -255,7 +273,8 @@ PROGRAM_GROUPS = {
         "schema",
     ],
     "Measure": [
-        "evaluate", "evaluate_surface", "synthesis_quality", "error_vs_time", "plan", "gpu_check",
+        "evaluate", "evaluate_surface", "evaluate_calibration", "synthesis_quality",
+        "error_vs_time", "plan", "gpu_check",
     ],
 }  # fmt: skip
 

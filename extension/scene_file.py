@@ -25,12 +25,17 @@ def home(path: Path) -> Path:
 
 
 def read(path: Path) -> dict[str, dict[str, Any]]:
-    """Return the keys of each rig in a scene YAML. Raises `UserError` if the YAML is not valid."""
+    """Return the keys of each rig in a scene YAML, without those that have a head.
+
+    Raises `UserError` if the YAML is not valid.
+    """
     text = read_settings_text(path, path.name)
     with chdir(home(path)):
         scene = check_scene(text, path.name)
     rigs = parse_yaml(text, path.name).get("rigs", {})
-    return {name: rigs.get(name) or as_written(rig) for name, rig in scene.rigs.items()}
+    return {
+        name: rigs.get(name) or as_written(rig) for name, rig in scene.rigs.items() if not rig.mount
+    }
 
 
 def write(path: Path, rigs: Rigs, removed: set[str], blend: Path | None, is_saved: bool) -> str:

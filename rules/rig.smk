@@ -1,6 +1,12 @@
 # The places of the cameras, and their lens.
 from lightfield.workflow.arguments import optional
-from lightfield.workflow.jobs import CHECK_CAMERAS, FREE_PLACES, LIGHTFIELD, SPLITS
+from lightfield.workflow.jobs import (
+    CHECK_CAMERAS,
+    FREE_PLACES,
+    HEADS,
+    LIGHTFIELD,
+    SPLITS,
+)
 
 
 # Only a random rig's places depend on the scene.
@@ -44,6 +50,7 @@ rule lightfield:
     output:
         lightfield=update(RUN.paths.lightfield),
         receipt=PLAN.receipt_of(LIGHTFIELD),
+        bundle=PLAN.bundle_of(LIGHTFIELD),
     log:
         RUN.log_of(LIGHTFIELD),
     benchmark:
@@ -102,3 +109,19 @@ rule splits:
     shell:
         f"python {RUN.scripts}/splits.py"
         " --output {output.splits} --receipt {output.receipt} {input.lightfields} > {log} 2>&1"
+
+
+rule heads:
+    input:
+        PLAN.reads(HEADS, lightfields=RUN.of_build(RUN.build.head_lightfields)),
+    output:
+        heads=update(RUN.paths.heads),
+        receipt=PLAN.receipt_of(HEADS),
+    log:
+        RUN.log_of(HEADS),
+    localrule: True
+    message:
+        "Listing the heads of {wildcards.scene}"
+    shell:
+        f"python {RUN.scripts}/heads.py"
+        " --output {output.heads} --receipt {output.receipt} {input.lightfields} > {log} 2>&1"

@@ -46,6 +46,35 @@ LENSES = {
         "resolution": [36, 22],
     },
 }
+# Calibrated cameras of which COLMAP has a model, with the model's name.
+CALIBRATED = {
+    "OPENCV": {"lens": "brown_conrady", "coefficients": [-0.2, 0.05, 0.004, -0.003]},
+    "FULL_OPENCV": {
+        "lens": "brown_conrady",
+        "coefficients": [0.3, 0.05, 0.004, -0.003, 0.01, 0.5, 0.04, 0.002],
+    },
+    "FOV": {"lens": "fov_model", "coefficients": [0.9]},
+    "DIVISION": {"lens": "division", "coefficients": [-0.3]},
+    "EUCM": {"lens": "extended_unified", "coefficients": [0.6, 1.1]},
+    "THIN_PRISM_FISHEYE": {
+        "lens": "thin_prism_fisheye",
+        "coefficients": [-0.02, 0.01, 0.004, -0.003, 0.002, -0.001, 0.005, -0.004],
+    },
+    "RAD_TAN_THIN_PRISM_FISHEYE": {
+        "lens": "fisheye624",
+        "coefficients": [
+            *(-0.03, 0.05, -0.03, 0.006, 0.002, -0.001),
+            *(0.004, -0.003, 0.003, -0.001, -0.004, 0.001),
+        ],
+    },
+}
+for _camera in CALIBRATED.values():
+    _camera |= {
+        "focal_length": 22,
+        "sensor_size": [36, 25],
+        "principal_point": [30.5, 25.25],
+        "resolution": [64, 48],
+    }
 
 
 def enlarged(camera, factor):

@@ -617,3 +617,39 @@ def test_a_video_that_cannot_be_made_is_refused_by_the_plan(path, value, why, mo
     block[key] = value
     with pytest.raises(UserError, match=re.escape(why)):
         scene_yaml.check_scene(yaml.safe_dump(content), "mine.yaml")
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "why"),
+    [
+        (
+            "render.camera_motion",
+            {"travel": [0, 0, -0.01], "rolling": 0.2},
+            "rigs.walk.imu.exposure: is missing; the times of a rolling shutter's rows need",
+        ),
+        ("reprojections", {"imu": {"format": "exr"}}, "reprojections.imu: the name imu is taken"),
+        ("rigs.walk.frames", {"first": 1, "last": 2}, "rigs.walk.imu: does not go with frames"),
+    ],
+)
+def test_a_sensor_that_cannot_be_is_refused_by_the_plan(path, value, why):
+    content = {
+        "scene": {"builder": "room"},
+        "render": {"samples": 4},
+        "rigs": {
+            "walk": {
+                "type": "path",
+                "count": 4,
+                "keys": [{"position": [0, 0, 1]}, {"position": [0, 1, 1]}],
+                "camera": {"lens": "equidistant", "fov": 180, "resolution": [16, 16]},
+                "imu": {"seconds": 2},
+            }
+        },
+    }
+    scene_yaml.check_scene(yaml.safe_dump(content), "mine.yaml")
+    *parents, key = path.split(".")
+    block = content
+    for parent in parents:
+        block = block[parent]
+    block[key] = value
+    with pytest.raises(UserError, match=re.escape(why)):
+        scene_yaml.check_scene(yaml.safe_dump(content), "mine.yaml")

@@ -190,6 +190,7 @@ CAMERAS = {
     "rectilinear": {"fov": 60, "principal_point": [7, 9]},
     "kannala_brandt": {"fov": 120, "focal_length": 10, "coefficients": [0.01, 0, 0, 0]},
     "polynomial": {"fov": 120, "coefficients": [0, -0.1, 0, 0, 0]},
+    "brown_conrady": {"focal_length": 20, "coefficients": [-0.2, 0.1, 0.001, 0.002]},
 }
 PLANE = {"type": "plane", "cameras": [2, 2]}
 

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pycolmap
 import pytest
-from sphere import LENSES, RADIUS, colour_of, look, look_at_ball, write_views
+from sphere import CALIBRATED, LENSES, RADIUS, colour_of, look, look_at_ball, write_views
 from test_exports import RIG, VIEWS, exported, on_sphere
 
 from lightfield.export.source import SourceDataset
@@ -28,7 +28,7 @@ MODELS = {
     "fisheye": "OPENCV_FISHEYE",
     "opencv": "OPENCV_FISHEYE",
     "panorama": "EQUIRECTANGULAR",
-}
+} | {name: name for name in CALIBRATED}
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,8 @@ def dataset(tmp_path_factory):
     folder = tmp_path_factory.mktemp("colmap") / "dataset"
     for source in MODELS:
         suffix = ".png" if source == "png" else ".exr"
-        write_views(folder / source, LENSES.get(source, LENSES["perspective"]), RIG, suffix)
+        camera = (LENSES | CALIBRATED).get(source, LENSES["perspective"])
+        write_views(folder / source, camera, RIG, suffix)
     # Points of 8-bit pictures come from the depth of the rendered views.
     write_views(folder, VIEWS, RIG)
     return folder
@@ -307,3 +308,48 @@ def test_a_fisheye_that_3dgrut_misreads_is_warned_of(tmp_path, capsys, changed, 
     folds_in = (radii[unseen] < radii[~unseen].max() - 0.01).any()
     cut = true.max() > projected.max()
     assert (off or folds_in or cut) == (problem is not None)
+
+
+def written(tmp_path, camera):
+    """Export views of a camera. Return COLMAP's camera, the lens, and the export's folder."""
+    write_views(tmp_path / "dataset", camera, RIG)
+    folder = exported(tmp_path / "dataset", "colmap", "views", tmp_path, points=50)
+    (found,) = read(folder).cameras.values()
+    return found, lenses.from_camera(camera)
+
+
+def test_a_unified_lens_is_colmaps_extended_one(tmp_path):
+    camera = CALIBRATED["EUCM"] | {"lens": "unified", "coefficients": [0.8]}
+    found, lens = written(tmp_path, camera)
+    assert found.model_name == "EUCM"
+    angles, azimuths = np.radians(np.meshgrid(np.linspace(1, 80, 9), np.linspace(0, 350, 9)))
+    rays = np.stack(
+        [np.sin(angles) * np.cos(azimuths), np.sin(angles) * np.sin(azimuths), np.cos(angles)], -1
+    ).reshape(-1, 3)
+    np.testing.assert_allclose(
+        found.img_from_cam(rays), lens.pixels(rays * [1, -1, -1]), rtol=0, atol=1e-9
+    )
+
+
+def test_a_division_lens_beyond_180_degrees_is_colmaps(tmp_path):
+    camera = CALIBRATED["DIVISION"] | {"focal_length": 6, "coefficients": [-0.5], "fov": 230}
+    found, lens = written(tmp_path, camera)
+    angles = np.radians([60, 89, 91, 112])
+    rays = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], -1)
+    pixels = lens.pixels(rays * [1, -1, -1])
+    assert np.isfinite(pixels).all()
+    np.testing.assert_allclose(found.img_from_cam(rays), pixels, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("model", "programs"),
+    [
+        ("FULL_OPENCV", "gsplat stops at"),
+        ("FOV", "gsplat and 3DGRUT stop at, and Brush takes for a pinhole"),
+        ("THIN_PRISM_FISHEYE", "gsplat and 3DGRUT stop at"),
+        ("EUCM", "gsplat, 3DGRUT and Brush stop at"),
+    ],
+)
+def test_a_model_that_trainers_do_not_read_is_a_warning(tmp_path, capsys, model, programs):
+    written(tmp_path, CALIBRATED[model])
+    assert f"camera: is COLMAP's {model}, which {programs}" in capsys.readouterr().err

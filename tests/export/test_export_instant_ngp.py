@@ -6,19 +6,23 @@ import re
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
+from sphere import CALIBRATED, look_at_ball, write_views
 
 from lightfield.core.errors import UserError
 from lightfield.engine.flags import parsed
+from lightfield.export.source import SourceDataset
 from lightfield.exporters import instant_ngp
 from lightfield.exporters.base import ExportSettings
 from lightfield.exporters.instant_ngp import InstantNgp, TransformsByHand
-from lightfield.formats.lightfield import LightField
+from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses
 from lightfield.geometry.depth import in_16_bits
 from lightfield.imaging import images
+from lightfield.products import exports
 
 RIG: dict[str, Any] = {
     "type": "cylinder",
@@ -38,6 +42,7 @@ PERSPECTIVE = {
 FISHEYE = {"lens": "equidistant", "resolution": [64, 64], "fov": 180}
 WIDE = {"lens": "equidistant", "resolution": [65, 65], "fov": 220}
 ORTHOGRAPHIC = {"lens": "orthographic", "resolution": [512, 512], "fov": 180}
+OPENCV = CALIBRATED["OPENCV"]
 PANORAMA = {"lens": "equirectangular", "resolution": [64, 32]}
 HALF_PANORAMA = {"lens": "equirectangular", "longitude": [-90, 90], "resolution": [32, 32]}
 
@@ -128,9 +133,21 @@ class Loader:
                     math.cos(phi) * math.cos(theta),
                 ]
             )
+        elif any(self.json.get(key) for key in ("k1", "k2", "p1", "p2")):
+            local = np.append(self.undistorted(u * width, v * height), 1)
         else:
             local = np.array([u * width / self.json["fl_x"], v * height / self.json["fl_y"], 1])
         return origin, axes @ local.astype(np.float32)
+
+    def undistorted(self, across: float, down: float) -> Any:
+        """Return the tangents of OpenCV's point at this many pixels from the principal point."""
+        matrix = np.diag([self.json["fl_x"], self.json["fl_y"], 1])
+        # The loader puts k3 and k4 where p1 and p2 are.
+        assert not {"k3", "k4"} & {*self.json}
+        distortion = np.array([self.json[key] for key in ("k1", "k2", "p1", "p2")])
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-12)
+        point = np.array([[[across, down]]], float)
+        return cv2.undistortPoints(point, matrix, distortion, criteria=criteria)[0, 0]
 
 
 def silvr_orientation(point: Any) -> list[float]:
@@ -279,6 +296,58 @@ def test_empty_pixels_of_transparent_views_are_not_hidden(dataset: Dataset) -> N
     np.testing.assert_array_equal(copied["A"], half)
 
 
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
+def test_views_of_two_rigs_go_into_one_list_beside_the_first_rigs_views(
+    tmp_path: Path, suffix: str
+) -> None:
+    rigs = {"near": RIG, "far": RIG | {"center": [0.2, 0.4, -0.3], "split": {"every": 3}}}
+    for name, rig in rigs.items():
+        write_views(tmp_path / name / "small", FISHEYE, rig, suffix, look_at_ball)
+    options = InstantNgp(sources=["small"], together=["near", "far"], depth=suffix == ".exr")
+    source = SourceDataset(tmp_path / "near", "small", suffix, {"far": tmp_path / "far"})
+    exports.run(source, options, tmp_path / "near/small")
+    # A package has only the first rig's folder.
+    (tmp_path / "near/small").rename(tmp_path / "package")
+    near, far = (
+        {view.name: (folder / f"{view.name}{suffix}", view) for view in _views(folder)}
+        for folder in (tmp_path / "package", tmp_path / "far/small")
+    )
+    expected = near | {f"far_{name}": view for name, view in far.items()}
+
+    package = Dataset(tmp_path / "package")
+    transforms = package.read("transforms.json")
+    assert _names(transforms) == [*expected]
+    loader = Loader(transforms)
+    cosine = -lenses.from_camera(FISHEYE).pixel_rays()[..., 2]
+    has_ray = np.isfinite(cosine)
+    for number, (path, view) in enumerate(expected.values()):
+        frame = transforms["frames"][number]
+        true = images.read_image(path).channels
+        picture = package.folder / frame["file_path"]
+        seen = images.read_image(picture).channels
+        np.testing.assert_array_equal(seen["G"][has_ray], true["G"][has_ray])
+        place = loader.position(silvr_orientation(view.position))
+        np.testing.assert_allclose(loader.camera(number)[1], place, atol=1e-6)
+        if suffix == ".png":
+            mask = images.read_image(picture.with_name(f"dynamic_mask_{picture.stem}.png"))
+            np.testing.assert_array_equal(mask.channels["Y"] == 255, ~has_ray)
+        else:
+            steps = images.read_image(package.folder / frame["depth_path"]).channels["Y"]
+            z = steps * transforms["integer_depth_scale"] * cosine
+            np.testing.assert_allclose(z[has_ray], true["Z"][has_ray], atol=0.001)
+    for part in ("train", "test"):
+        in_part = [name for name, (_, view) in expected.items() if view.split == part]
+        assert _names(package.read(f"transforms_{part}.json")) == in_part
+
+
+def _views(folder: Path) -> list[View]:
+    return LightField.read(folder / "lightfield.json").views
+
+
+def _names(transforms: dict[str, Any]) -> list[str]:
+    return [Path(frame["file_path"]).stem for frame in transforms["frames"]]
+
+
 def test_missing_images_are_a_warning(dataset: Dataset, capsys: pytest.CaptureFixture[str]) -> None:
     dataset.write(PERSPECTIVE)
     images.write_png(dataset.folder / "view_0000f.png", np.ones((48, 64, 3), np.uint8))
@@ -289,7 +358,7 @@ def test_missing_images_are_a_warning(dataset: Dataset, capsys: pytest.CaptureFi
 
 
 @pytest.mark.parametrize("meaning", ["z", "distance"])
-@pytest.mark.parametrize("camera", [PERSPECTIVE, FISHEYE])
+@pytest.mark.parametrize("camera", [PERSPECTIVE, FISHEYE, OPENCV])
 def test_the_loaders_depth_is_the_true_distance(
     camera: Any, meaning: str, dataset: Dataset
 ) -> None:
@@ -598,6 +667,18 @@ def test_other_fisheyes_are_approximated_to_a_quarter_of_a_pixel(
         assert abs(angle_between(direction, axes[:, 2]) - angle) < 0.25 * pixel
 
 
+def test_the_loader_undistorts_opencvs_lens(dataset: Dataset) -> None:
+    dataset.write(OPENCV)
+    loader = Loader(dataset.export())
+    lens = lenses.from_camera(OPENCV)
+    axes, _ = loader.camera(0)
+    for x, y in ((3, 4), (60, 10), (31, 24), (20, 44)):
+        _, direction = loader.ray(0, x, y)
+        # The loader's camera looks along z, with y down.
+        expected = lens.rays(x, y) * [1, -1, -1]
+        assert angle_between(axes.T @ direction, expected) < 1e-6
+
+
 @pytest.mark.parametrize("turned", [1, -1])
 def test_a_polynomial_lens_is_exported_exactly(turned: int, dataset: Dataset) -> None:
     terms = [0.01, -0.1, 2e-3, -3e-4, 1e-5]  # Radians per mm^i; a pixel has 36 / 64 mm.
@@ -626,6 +707,8 @@ def test_a_polynomial_lens_is_exported_exactly(turned: int, dataset: Dataset) ->
         (ORTHOGRAPHIC | {"resolution": [64, 64]}, [], "misses it by 0.41 pixels"),
         (ORTHOGRAPHIC | {"resolution": [40, 40]}, [], "misses it by 0.26 pixels"),
         (PANORAMA | {"latitude": [-45, 45]}, [], "instant-ngp cannot follow"),
+        (CALIBRATED["FULL_OPENCV"], [], r"cannot follow this lens \(it has p1 or p2 beside k3"),
+        (CALIBRATED["THIN_PRISM_FISHEYE"], [], r"cannot follow this lens \(it has a thin prism"),
         (PANORAMA | {"longitude": [-180, 170]}, [], "instant-ngp cannot follow"),
         # A fisheye along both axes of the image, but not between them.
         (HALF_PANORAMA, [], "instant-ngp cannot follow"),

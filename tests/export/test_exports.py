@@ -20,7 +20,15 @@ from oracles.readers.contents import Exported
 from oracles.readers.ply import read_vertices
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
-from sphere import LENSES, RADIUS, colour_of, look, make_transparent, write_views
+from sphere import (
+    CALIBRATED,
+    LENSES,
+    RADIUS,
+    colour_of,
+    look,
+    make_transparent,
+    write_views,
+)
 
 from lightfield.configuration.scene_yaml import Scene
 from lightfield.core.errors import UserError
@@ -31,6 +39,7 @@ from lightfield.export.source import SourceDataset
 from lightfield.exporters import BESIDE_VIEWS, EXPORTERS, SEQUENCE_EXPORTS, Exports, hci
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry import lenses, rigs
+from lightfield.geometry.lenses import calibrations
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.products import exports
@@ -41,13 +50,30 @@ from lightfield.validation import files as validation_files
 RIG = {"type": "plane", "cameras": [4, 3], "size": 1.2, "center": [0.3, -0.2, 0.1]}
 EVEN_PLANE = {"type": "plane", "cameras": [4, 3], "baseline": 0.4}
 VIEWS = {"lens": "equidistant", "fov": 180, "resolution": [96, 96]}
+THREE_RADIAL = {"coefficients": [-0.2, 0.05, 0.004, -0.003, 0.02]}
+OTHERS = {
+    "OPENCV": CALIBRATED["OPENCV"],
+    "three_radial": CALIBRATED["OPENCV"] | THREE_RADIAL,
+    "FULL_OPENCV": CALIBRATED["FULL_OPENCV"],
+    "FISHEYE624": CALIBRATED["RAD_TAN_THIN_PRISM_FISHEYE"],
+    "f_theta": CALIBRATED["EUCM"]
+    | {"lens": "f_theta", "coefficients": [0.02, -0.05, 0.003, 0.001], "focal_length": 10},
+}
+# It shows rays up to 115° in the image's corners.
+TUM_VI = {
+    "lens": "kannala_brandt",
+    "focal_length": 13.43,
+    "coefficients": [0.00348, 0.000715, -0.00205, 0.000203],
+    "resolution": [512, 512],
+}
+WIDE_624 = OTHERS["FISHEYE624"] | {"focal_length": 9}
 
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory):
     folder = tmp_path_factory.mktemp("exports") / "dataset"
     write_views(folder, VIEWS, RIG)
-    for name, camera in LENSES.items():
+    for name, camera in (LENSES | OTHERS).items():
         write_views(folder / name, camera, RIG)
     write_views(folder / "png", LENSES["perspective"], RIG, ".png")
     write_views(folder / "split", LENSES["perspective"], RIG | {"split": "odd"})
@@ -85,8 +111,24 @@ def nerfstudio_rays(content):
     y, x = np.mgrid[: content["h"], : content["w"]] + 0.5
     x, y = (x - content["cx"]) / content["fl_x"], -(y - content["cy"]) / content["fl_y"]
     if content["camera_model"] == "OPENCV":
-        assert [content[key] for key in ("k1", "k2", "p1", "p2")] == [0, 0, 0, 0]
-        return np.stack([x, y, -np.ones_like(x)], axis=-1)
+        distortion = [content.get(key, 0.0) for key in ("k1", "k2", "p1", "p2", "k3")]
+        assert not content.get("k4", 0)
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-12)
+        points = np.stack([x, -y], axis=-1).reshape(-1, 1, 2)
+        flat = cv2.undistortPoints(points, np.eye(3), np.array(distortion), criteria=criteria)
+        x, y = np.moveaxis(flat.reshape(*x.shape, 2), -1, 0)
+        return np.stack([x, -y, -np.ones_like(x)], axis=-1)
+    if content["camera_model"] == "FISHEYE624":
+        parameters = [content[key] for key in ("fl_x", "fl_y", "cx", "cy")]
+        camera = pycolmap.Camera(
+            model="RAD_TAN_THIN_PRISM_FISHEYE",
+            width=content["w"],
+            height=content["h"],
+            params=[*parameters, *content["distortion_params"]],
+        )
+        centres = np.mgrid[: content["h"], : content["w"]][::-1].reshape(2, -1).T + 0.5
+        flat = camera.cam_from_img(centres).reshape(*x.shape, 2)
+        return np.concatenate([flat, np.ones_like(x)[..., None]], axis=-1) * [1, -1, -1]
     if content["camera_model"] == "OPENCV_FISHEYE":
         assert [content[f"k{i}"] for i in range(1, 5)] == [0, 0, 0, 0]
         theta = np.clip(np.hypot(x, y), 0, math.pi)
@@ -99,7 +141,13 @@ def nerfstudio_rays(content):
     )
 
 
-@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "wide", "panorama"])
+@pytest.mark.parametrize(
+    "source",
+    [
+        *("perspective", "shifted", "fisheye", "wide", "panorama"),
+        *("OPENCV", "three_radial", "FISHEYE624"),
+    ],
+)
 def test_nerfstudio_lifts_its_depth_to_the_scene(dataset, tmp_path, source):
     folder = exported(dataset, "nerfstudio", source, tmp_path, depth=True, points=100)
     content = json.loads((folder / "transforms.json").read_text())
@@ -149,7 +197,7 @@ def brush_pixels(content, local):
     return cv2.projectPoints(local, still, still, matrix, distortion)[0][:, 0]
 
 
-@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv"])
+@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "opencv", "OPENCV"])
 def test_brush_reads_the_cameras_of_a_nerfstudio_export(dataset, tmp_path, source):
     folder = exported(dataset, "nerfstudio", source, tmp_path, points=400)
     content = json.loads((folder / "transforms.json").read_text())
@@ -175,7 +223,7 @@ def test_brush_reads_the_cameras_of_a_nerfstudio_export(dataset, tmp_path, sourc
         assert lit.sum() > 20
         # A fisheye's pixels are up to 0.3 m wide, and colour changes by 29 levels a metre.
         np.testing.assert_allclose(shown[row, column][lit], colours[in_front][inside][lit], atol=12)
-    rays = lenses.from_camera(LENSES[source]).pixel_rays() * [1, -1, -1]
+    rays = lenses.from_camera((LENSES | OTHERS)[source]).pixel_rays() * [1, -1, -1]
     row, column = np.nonzero(rays[..., 2] > 0.05)
     projected = brush_pixels(content, rays[row, column])
     np.testing.assert_allclose(projected, np.column_stack([column, row]) + 0.5, atol=1e-4)
@@ -476,13 +524,29 @@ def test_scannetpp_is_a_text_model_beside_fisheyes_with_masks(dataset, tmp_path)
         assert not images.read_image(path).channels["R"][mask == 0].any()
 
 
+def ncore_matrix(lens):
+    (fx, fy), (cx, cy) = lens["focal_length"], lens["principal_point"]
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+
+
 def ncore_pixels(attributes, local):
     """Project directions (n, 3), x right, y down and z forward, as NCore's documentation does."""
     lens = attributes["camera_model_parameters"]
     x, y, z = local.T
+    still = np.zeros(3)
     if attributes["camera_model_type"] == "opencv-pinhole":
-        pixels = np.column_stack([x / z, y / z]) * lens["focal_length"] + lens["principal_point"]
-        return np.where(z[:, None] > 0, pixels, np.nan)
+        k1, k2, *others = lens["radial_coeffs"]
+        distortion = np.array([k1, k2, *lens["tangential_coeffs"], *others])
+        pixels, _ = cv2.projectPoints(local, still, still, ncore_matrix(lens), distortion)
+        return np.where(z[:, None] > 0, pixels[:, 0], np.nan)
+    if attributes["camera_model_type"] == "opencv-fisheye":
+        angle = np.arctan2(np.hypot(x, y), z)
+        pixels = np.full((len(local), 2), np.nan)
+        seen = angle < lens["max_angle"]
+        pixels[seen] = cv2.fisheye.projectPoints(
+            local[seen][:, None], still, still, ncore_matrix(lens), np.array(lens["radial_coeffs"])
+        )[0][:, 0]
+        return pixels
     assert lens["reference_poly"] == "ANGLE_TO_PIXELDIST"
     angle = np.arctan2(np.hypot(x, y), z)
     radius = np.polynomial.Polynomial(lens["angle_to_pixeldist_poly"])(angle)
@@ -492,7 +556,10 @@ def ncore_pixels(attributes, local):
     return np.where(angle[:, None] <= lens["max_angle"], pixels, np.nan)
 
 
-@pytest.mark.parametrize("source", ["perspective", "shifted", "fisheye", "wide"])
+@pytest.mark.parametrize(
+    "source",
+    ["perspective", "shifted", "fisheye", "wide", "opencv", "OPENCV", "FULL_OPENCV", "f_theta"],
+)
 def test_an_ncore_sequence_shows_its_points_where_the_views_see_them(dataset, tmp_path, source):
     folder = exported(dataset, "ncore", source, tmp_path, points=400)
     sequence = json.loads((folder / "views.json").read_text())
@@ -521,7 +588,7 @@ def test_an_ncore_sequence_shows_its_points_where_the_views_see_them(dataset, tm
         assert set(channels) == {*"RGB"}
         height, width = channels["R"].shape
         mask = np.full((height, width), 255)
-        if source in ("fisheye", "wide"):
+        if source in ("fisheye", "wide", "opencv"):
             mask = store.array(f"{view}/generic_data/mask")
             assert set(np.unique(mask)) == {0, 255}
         lens = store.attributes("intrinsics/default/cameras/camera")
@@ -971,8 +1038,8 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
         ),
         ("hci", "again", VIEWS, {}, "holds no depth; give reprojections.again format: exr"),
         ("scannetpp", "views", VIEWS, {}, "sees 180 degrees, but this layout ends below"),
-        ("ncore", "views", LENSES["panorama"], {}, "not an equidistant fisheye or a pinhole"),
-        ("lichtfeld", "views", VIEWS | {"fov": 200}, {}, "sees 200 degrees, but LichtFeld's ends"),
+        ("ncore", "views", LENSES["panorama"], {}, "has a lens that NCore lacks"),
+        ("lichtfeld", "views", VIEWS | {"fov": 200}, {}, "sees 200 degrees, but LichtFeld's fish"),
         ("lichtfeld", "views", LENSES["half"], {}, "is a part of a panorama"),
         ("lichtfeld", "views", LENSES["panorama"], {"depth": True}, "leave out depth: true"),
         (
@@ -1156,7 +1223,7 @@ def test_other_files_in_an_earlier_exports_folder_are_kept(dataset, tmp_path):
         ("miv", "fisheye", "has a lens that MIV lacks"),
         ("scannetpp", "perspective", "is not an equidistant fisheye"),
         ("colmap", "views", "sees 180 degrees, but COLMAP's fisheye ends below 180"),
-        ("ncore", "panorama", "is not an equidistant fisheye or a pinhole"),
+        ("ncore", "panorama", "has a lens that NCore lacks"),
         ("lichtfeld", "opencv", "has a fourth coefficient, which LichtFeld drops; reproject"),
     ],
 )
@@ -1166,6 +1233,62 @@ def test_views_that_a_consumer_cannot_take_are_refused_by_hand_too(
     with pytest.raises(UserError, match=rf"lightfield.json: {why}"):
         exported(dataset, name, source, tmp_path)
     assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("lens", "coefficients", "fov"),
+    [
+        ("brown_conrady", [-0.2, 0.05, 0.004, -0.003], 100),
+        ("kannala_brandt", [0.02, -0.01, 0.003, -0.001], 160),
+        ("fov_model", [0.9], 160),
+        ("unified", [0.9], 200),
+        ("double_sphere", [-0.17, 0.59], 200),
+        ("extended_unified", [0.63, 1.04], 200),
+    ],
+)
+def test_kalibr_gets_the_lens_of_the_views(tmp_path, lens, coefficients, fov):
+    camera = CALIBRATED["FOV"] | {"lens": lens, "coefficients": coefficients, "fov": fov}
+    write_views(tmp_path / "dataset", camera, RIG)
+    folder = exported(tmp_path / "dataset", "kalibr", "views", tmp_path)
+    angles, azimuths = np.radians(
+        np.meshgrid(np.linspace(0, fov / 2 - 1, 9), np.arange(0, 360, 40))
+    )
+    sin = np.sin(angles)
+    rays = np.stack([sin * np.cos(azimuths), sin * np.sin(azimuths), -np.cos(angles)], axis=-1)
+    found = calibrations.read(folder / "camchain.yaml")
+    expected = lenses.from_camera(camera).pixels(rays)
+    np.testing.assert_allclose(found.pixels(rays), expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "camera", "why"),
+    [
+        ("ncore", CALIBRATED["EUCM"], "has a lens that NCore lacks; reproject to"),
+        ("colmap", OTHERS["f_theta"], "has a lens that COLMAP lacks; reproject to"),
+        ("colmap", WIDE_624, "sees 90 degrees from its axis, where COLMAP's"),
+        ("nerfstudio", WIDE_624, "sees 90 degrees from its axis, where nerfstudio's"),
+        ("nerfstudio", OTHERS["FULL_OPENCV"], "has k4 to k6, which nerfstudio lacks"),
+        ("nerfstudio", CALIBRATED["FOV"], "has a lens that nerfstudio lacks"),
+        ("instant_ngp", OTHERS["FISHEYE624"], "cannot follow: it has a thin prism"),
+        ("lichtfeld", OTHERS["OPENCV"], "has a lens that LichtFeld lacks"),
+        ("kalibr", OTHERS["FULL_OPENCV"], "has k3 to k6, which Kalibr lacks"),
+        ("kalibr", CALIBRATED["DIVISION"], "has a lens that Kalibr lacks"),
+    ],
+)
+def test_calibrated_views_that_a_consumer_cannot_take_are_refused(tmp_path, name, camera, why):
+    write_views(tmp_path / "dataset", camera, RIG)
+    with pytest.raises(UserError, match=rf"lightfield.json: .*{why}"):
+        exported(tmp_path / "dataset", name, "views", tmp_path / "exports")
+
+
+def test_ncore_refuses_a_fisheye_whose_rays_its_three_steps_miss():
+    """Three steps of Newton's method, from an angle proportional to the radius."""
+    refusals = {}
+    for fov in (360, 190):
+        lens = lenses.from_camera(TUM_VI | {"fov": fov})
+        refusals[fov] = EXPORTERS["ncore"](sources=["views"]).refusal(lens, True)
+    assert "NCore's inverse misses by 0.73 pixels" in refusals[360]
+    assert refusals[190] is None
 
 
 def by_hand(run_program, dataset, folder, *arguments):
@@ -1248,7 +1371,8 @@ def test_a_point_cloud_may_have_views_that_see_no_surface(dataset, tmp_path):
     assert len(read_vertices(folder / "points.ply")) > 2000
 
 
-def test_views_of_another_lens_do_not_test(dataset):
+def test_views_of_another_lens_do_not_test(dataset, tmp_path):
     source = SourceDataset(dataset / "perspective", "", ".exr", {"other": dataset / "shifted"})
+    settings = TypeAdapter(EXPORTERS["nerf_synthetic"]).validate_python({"sources": ["views"]})
     with pytest.raises(UserError, match="camera: must be the same as in"):
-        _ = source.lightfield
+        exports.run(source, settings, tmp_path / "export")

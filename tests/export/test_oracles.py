@@ -13,7 +13,7 @@ import oracles
 import pytest
 from oracles import exported_cameras, exported_depth, exported_pictures
 from pydantic import TypeAdapter
-from sphere import LENSES, look_at_ball, write_views
+from sphere import CALIBRATED, LENSES, look_at_ball, write_views
 
 from lightfield.core.files import read_json, write_json
 from lightfield.engine.flags import parsed
@@ -46,6 +46,8 @@ SETS = {
     "half": LENSES["half"],
     "left": LENSES["left"],
     "split": LENSES["perspective"],
+    "distorted": CALIBRATED["OPENCV"],
+    "aria": CALIBRATED["RAD_TAN_THIN_PRISM_FISHEYE"],
 }
 # The exports of each set; "views" are the rendered ones.
 EXPORTS = {
@@ -78,6 +80,12 @@ EXPORTS = {
         "opendibr": {},
         "miv": {},
     },
+    "distorted": {
+        "colmap": {"format": "text", "points": 60, "depth": True},
+        "nerfstudio": {"points": 60, "depth": True},
+        "ncore": {"points": 60},
+    },
+    "aria": {"colmap": {"points": 60}, "nerfstudio": {"points": 60, "depth": True}},
     "half": {"opendibr": {}, "miv": {}},
     "left": {"opendibr": {}, "miv": {}},
     "split": {
@@ -108,6 +116,7 @@ INSTANT_NGP = {
     ],
     "wide": [],
     "opencv": [],
+    "distorted": [],
     "panorama": [],
     "split": [],
 }

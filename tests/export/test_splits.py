@@ -250,8 +250,8 @@ def test_two_rigs_of_a_sequence_are_exported_together_frame_by_frame(tmp_path, m
         (["inner", "outer", "along", "alone"], {}, "only one of inner and alone has a split"),
         (
             ["alone", "near"],
-            {"near": {**PLANE, "camera": PERSPECTIVE | {"fov": 60}}},
-            "rigs.near.camera: must be as in alone; see exports.colmap.together",
+            {"near": {**PLANE, "camera": PERSPECTIVE, "frames": {"first": 1, "last": 2}}},
+            "rigs.near.frames: must be as in alone; see exports.colmap.together",
         ),
     ],
 )

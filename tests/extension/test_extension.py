@@ -406,6 +406,18 @@ def test_opening_and_writing_leaves_every_scene_yaml_as_it_is(blender, tmp_path)
         assert path.read_text() == (SCENES / path.name).read_text()
 
 
+def test_a_rig_with_a_head_stays_in_the_yaml_as_it_is(blender, project):
+    path = project / "configs/scenes/mine.yaml"
+    text = path.read_text()
+    camera = "{lens: rectilinear, fov: 60, resolution: [16, 16]}"
+    head = f"head: {{left: {{camera: {camera}}}, right: {{camera: {camera}, position: [1, 0, 0]}}}}"
+    text = text.replace("rigs:\n", f"rigs:\n  pair: {{type: plane, cameras: [2, 1], {head}}}\n", 1)
+    path.write_text(text)
+    *_, drawn, _ = blender("register", opened(path), "rigs", written())
+    assert drawn.keys() == read_scene(path).rigs.keys() - {"pair_left", "pair_right"}
+    assert path.read_text() == text
+
+
 def test_rigs_are_added_removed_copied_and_renamed(blender, project):
     path = project / "configs/scenes/mine.yaml"
     results = blender(

@@ -13,6 +13,7 @@ import cv2
 import forks
 import mpmath
 import numpy as np
+import pycolmap
 import pytest
 import yaml
 from conftest import BLENDER
@@ -29,19 +30,32 @@ from lightfield.geometry.lenses import (
     from_camera,
     from_lightfield,
 )
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
+from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
+from lightfield.geometry.lenses.division import Division
+from lightfield.geometry.lenses.double_sphere import DoubleSphere
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.equisolid import Equisolid
+from lightfield.geometry.lenses.extended_unified import ExtendedUnified
+from lightfield.geometry.lenses.f_theta import FTheta
+from lightfield.geometry.lenses.fisheye624 import Fisheye624
+from lightfield.geometry.lenses.fov_model import FovModel
 from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.orthographic import Orthographic
 from lightfield.geometry.lenses.polynomial import Polynomial
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.lenses.stereographic import Stereographic
+from lightfield.geometry.lenses.thin_prism_fisheye import ThinPrismFisheye
+from lightfield.geometry.lenses.unified import Unified
 
 BLENDER_POLYNOMIAL = (-1.17e-05, -0.0199887, -3.3525e-06, 3.09927e-06, -2.60646e-08)
 OPENCV = (-0.01, 0.03, -0.02, 0.003)
+RATIONAL = (8.1, 4.2, 1e-3, -8e-4, 0.2, 8.4, 6.1, 1.0)
+THIN_PRISM = (-0.01, 0.03, 2e-3, -1e-3, -0.02, 0.003, 3e-3, -2e-3)
+OF_624 = (-0.027, 0.102, -0.072, 0.0125, 1.2e-3, -4e-4, 5e-3, -4e-3, -2e-3, -4e-4, 3e-3, 1e-4)
 SIZE = {"width": 2048, "height": 1536}
 SHIFTED = {**SIZE, "principal_point": (900.25, 1000.5)}
 
@@ -68,12 +82,41 @@ EXAMPLES: dict[str, Lens] = {
     "kannala_brandt shifted": KannalaBrandt(
         **SHIFTED, focal_length=11, coefficients=(0, 0, 0, 0), fov=math.radians(300)
     ),
+    "brown_conrady": BrownConrady(**SIZE, focal_length=11, coefficients=RATIONAL),
+    "brown_conrady shifted": BrownConrady(
+        **SHIFTED, focal_length=17, coefficients=(-0.25, 0.09, 1e-3, -8e-4, -0.014, 0, 0, 0)
+    ),
+    "thin_prism_fisheye": ThinPrismFisheye(**SIZE, focal_length=11, coefficients=THIN_PRISM),
+    "fisheye624": Fisheye624(**SIZE, focal_length=11, coefficients=OF_624),
+    "fisheye624 shifted": Fisheye624(**SHIFTED, focal_length=11, coefficients=OF_624, fov=3.5),
+    "division": Division(**SIZE, focal_length=11, coefficients=(-0.35,)),
+    "division k > 0": Division(**SHIFTED, focal_length=30, coefficients=(0.2,)),
+    "division k = 0": Division(**SIZE, focal_length=18, coefficients=(0.0,)),
+    "fov_model": FovModel(**SIZE, focal_length=14, coefficients=(0.93,)),
+    "fov_model shifted": FovModel(**SHIFTED, focal_length=14, coefficients=(1e-6,)),
+    "unified": Unified(**SIZE, focal_length=20, coefficients=(0.9,)),
+    "unified xi > 1": Unified(**SHIFTED, focal_length=40, coefficients=(1.6,)),
+    "unified xi = 1": Unified(**SIZE, focal_length=12, coefficients=(1.0,), fov=5.5),
+    "extended_unified": ExtendedUnified(**SIZE, focal_length=9, coefficients=(0.628, 1.023)),
+    "extended_unified alpha < 0.5": ExtendedUnified(
+        **SHIFTED, focal_length=14, coefficients=(0.3, 4.0)
+    ),
+    "double_sphere": DoubleSphere(**SIZE, focal_length=9, coefficients=(-0.172, 0.593)),
+    "double_sphere alpha < 0.5": DoubleSphere(
+        **SHIFTED, focal_length=14, coefficients=(0.4, 0.3), fov=3.3
+    ),
+    "f_theta": FTheta(**SIZE, focal_length=11, coefficients=(0.01, -0.02, 0.003, -0.001)),
+    "f_theta shifted": FTheta(**SHIFTED, focal_length=11, coefficients=(0, 0.1, 0, 0), fov=3),
     "equirectangular": Equirectangular(**SIZE),
     "equirectangular part": Equirectangular(**SIZE, longitude=(-1, 2.5), latitude=(-0.5, 1.2)),
     "equirectangular part ahead": Equirectangular(**SIZE, longitude=(-1.2, 1.2)),
     "equirectangular part to the left": Equirectangular(**SIZE, longitude=(-2, 1)),
     "cube map": CubeMap(width=6 * 512, height=512),
 }
+
+# An example of each lens of calibrated cameras. All but one may see behind them.
+CALIBRATED = [name for name, lens in LENSES.items() if issubclass(lens, CalibratedLens)]
+SEEING_BEHIND = [name for name in CALIBRATED if name != "brown_conrady"]
 
 LANDSCAPE, PORTRAIT = {"width": 96, "height": 64}, {"width": 64, "height": 96}
 CAMERAS: dict[str, Lens] = {
@@ -222,6 +265,47 @@ def test_kannala_brandt_is_opencvs_fisheye() -> None:
     assert angle(lens.rays(expected[:, 0, 0], expected[:, 0, 1]), rays).max() < 1e-12
 
 
+COLMAP = {
+    "division": ("DIVISION", Division, (-0.35,), 1.55, 170),
+    "division k > 0": ("DIVISION", Division, (0.2,), 0.84, 47.9),
+    "simple division": ("SIMPLE_DIVISION", Division, (-0.05,), 1.55, 120),
+    "fov_model": ("FOV", FovModel, (0.93,), 1.55, 89.9),
+    "fov_model narrow": ("FOV", FovModel, (2.5,), 1.55, 89.9),
+    "extended_unified": ("EUCM", ExtendedUnified, (0.628, 1.023), 1.55, 89.9),
+    "extended_unified alpha < 0.5": ("EUCM", ExtendedUnified, (0.3, 4.0), 1.55, 89.9),
+}
+
+
+@pytest.mark.parametrize("name", COLMAP)
+def test_lenses_of_colmap_have_its_pixels_and_rays(name: str) -> None:
+    model, lens_class, coefficients, inverted_to, degrees = COLMAP[name]
+    is_simple = model == "SIMPLE_DIVISION"
+    sensor = (36, 27 if is_simple else 30)
+    focal_lengths = [12 / sensor[0] * 640, 12 / sensor[1] * 480][: 1 if is_simple else 2]
+    lens = lens_class(
+        width=640,
+        height=480,
+        focal_length=12,
+        sensor_size=sensor,
+        principal_point=(310, 250),
+        coefficients=coefficients,
+    )
+    numbers = [*focal_lengths, 310, 250, *coefficients]
+    camera = pycolmap.Camera(model=model, width=640, height=480, params=numbers)
+    random = np.random.default_rng(4)
+    # Within 0.6° of the axis, COLMAP's FOV is a series, which is off by up to 2e-6 pixels.
+    theta, phi = np.radians(random.uniform(1, degrees, 1000)), random.uniform(-np.pi, np.pi, 1000)
+    # COLMAP's cameras look along +Z with +Y down, and its first pixel's centre is at 0.5.
+    points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], 1)
+    rays = points * [1, -1, -1]
+    expected = camera.img_from_cam(points * 3)
+    np.testing.assert_allclose(lens.pixels(rays), expected, rtol=1e-12, atol=1e-9)
+    # Where COLMAP's own inverse has the sign of z, it agrees, too.
+    seen = theta < inverted_to
+    back = camera.cam_ray_from_img(expected[seen]) * [1, -1, -1]
+    assert angle(lens.rays(*expected[seen].T), back).max() < 1e-10
+
+
 @pytest.mark.parametrize("name", [name for name in EXAMPLES if name.startswith("rectilinear")])
 def test_k_projects_in_opencv_to_the_lenss_pixels(name: str) -> None:
     lens = EXAMPLES[name]
@@ -341,6 +425,11 @@ def fisheyes(fov: float) -> list[Lens]:
         Stereographic(**size),
         Polynomial(**size, coefficients=(0, -0.25, 0, 0, 0)),
         KannalaBrandt(**size, **calibration),
+        FTheta(**size, **calibration),
+        Division(**size, focal_length=4, coefficients=(-1,)),
+        Unified(**size, focal_length=4, coefficients=(1,)),
+        ExtendedUnified(**size, focal_length=4, coefficients=(0.6, 1.1)),
+        DoubleSphere(**size, focal_length=4, coefficients=(-0.2, 0.6)),
     ]
 
 
@@ -415,6 +504,20 @@ def test_beyond_the_field_of_view_is_nan() -> None:
             KannalaBrandt(**size, focal_length=10, coefficients=(0, 0, 0, 0), fov=3),
             math.degrees(1.5),
         ),
+        (Division(**size, focal_length=10, coefficients=(0.75,)), 30),
+        (Division(**size, focal_length=10, coefficients=(-0.75,)), 180),
+        (FovModel(**size, focal_length=10, coefficients=(1,)), 90),
+        (FovModel(**size, focal_length=10, coefficients=(1,), fov=3), math.degrees(1.5)),
+        (Unified(**size, focal_length=10, coefficients=(0.5,)), 120),
+        (Unified(**size, focal_length=10, coefficients=(2,)), 120),
+        (Unified(**size, focal_length=10, coefficients=(-0.5,)), 60),
+        (ExtendedUnified(**size, focal_length=10, coefficients=(1 / 3, 1)), 120),
+        (ExtendedUnified(**size, focal_length=10, coefficients=(2 / 3, 1)), 120),
+        (DoubleSphere(**size, focal_length=10, coefficients=(0, 1 / 3)), 120),
+        (DoubleSphere(**size, focal_length=10, coefficients=(0, 2 / 3)), 120),
+        # Both spheres see 90°, and the second sphere's centre lies ξ behind the first.
+        (DoubleSphere(**size, focal_length=10, coefficients=(0.5, 1)), 120),
+        (DoubleSphere(**size, focal_length=10, coefficients=(-0.5, 1)), 60),
         (Equirectangular(**size), 180),
         (CubeMap(width=96, height=16), 180),
     ):
@@ -478,6 +581,159 @@ def test_kannala_brandt_ends_at_its_turning_point() -> None:
     assert np.isfinite(lens.rays(100 + scale * 0.6666, 100)).all()
     assert np.isnan(lens.rays(100 + scale * 0.6667, 100)).all()
     assert np.isnan(lens.pixels(np.array([math.sin(1.001), 0, -math.cos(1.001)]))).all()
+
+
+@pytest.mark.parametrize(
+    ("lens", "degrees", "radius"),
+    [
+        # r = θ − θ³ / 3 turns at 1 rad.
+        (KannalaBrandt(**LANDSCAPE, focal_length=9, coefficients=(-1 / 3, 0, 0, 0)), 57.3, 0.6667),
+        # r = t − t³ / 3 turns at t = 1, and θ = 45°.
+        (
+            BrownConrady(**LANDSCAPE, focal_length=18, coefficients=(-1 / 3, *[0.0] * 7)),
+            45,
+            0.6667,
+        ),
+        (
+            ThinPrismFisheye(**LANDSCAPE, focal_length=9, coefficients=(-1 / 3, *[0.0] * 7)),
+            57.3,
+            0.6667,
+        ),
+        # The prism alone folds the image: 2 s r = 1, before r = θ reaches 360° / 2.
+        (
+            Fisheye624(**LANDSCAPE, focal_length=9, coefficients=(*[0.0] * 8, 0.5, 0, 0, 0)),
+            57.3,
+            1,
+        ),
+        # r = θ − θ² / 4 turns at 2 rad.
+        (FTheta(**LANDSCAPE, focal_length=9, coefficients=(-0.25, 0, 0, 0)), 114.6, 1),
+        # tan θ = r / (1 + r²) is at most 1 / 2.
+        (Division(**LANDSCAPE, focal_length=9, coefficients=(1,)), 26.57, 1),
+        (FovModel(**LANDSCAPE, focal_length=9, coefficients=(math.pi / 2,)), 90, 1),
+        # cos θ = −1 / ξ, r = 1 / √(ξ² − 1).
+        (Unified(**LANDSCAPE, focal_length=9, coefficients=(1.25,)), 143.1, 4 / 3),
+        # The unit sphere, seen from infinity.
+        (ExtendedUnified(**LANDSCAPE, focal_length=9, coefficients=(1, 1)), 90, 1),
+        (DoubleSphere(**LANDSCAPE, focal_length=9, coefficients=(0, 1)), 90, 1),
+    ],
+    ids=lambda lens: getattr(lens, "name", ""),
+)
+def test_a_lens_that_ends_inside_its_image_says_where_and_how_much_has_no_ray(
+    lens: CalibratedLens, degrees: float, radius: float
+) -> None:
+    assert lens.clipped is not None
+    assert "\n" not in lens.clipped
+    assert f"the {lens.title} ends at {degrees:.4g}°, {radius:.4g} focal lengths" in lens.clipped
+    blank = np.isnan(lens.pixel_rays()).any(axis=-1).mean()
+    assert f"{100 * blank:.2g} % of the image has no ray" in lens.clipped
+    assert "fov" in lens.clipped
+    # A user's limit is no surprise. Neither is a frame inside the limit.
+    assert replace(lens, fov=2 * math.radians(degrees) - 0.01).clipped is None
+    assert replace(lens, fov=2 * math.radians(degrees) + 0.01).clipped == lens.clipped
+    assert replace(lens, focal_length=90).clipped is None
+
+
+def test_lenses_without_an_end_are_not_clipped() -> None:
+    for name in ("rectilinear", "equidistant 180°", "division", "unified xi = 1", "polynomial"):
+        assert EXAMPLES[name].clipped is None
+
+
+@pytest.mark.parametrize(
+    ("lens", "coefficients", "message"),
+    [
+        (FovModel, (0.0,), "omega = 0.0 must be above 0 and below π"),
+        (FovModel, (math.pi,), "omega = 3.14.* must be above 0 and below π"),
+        (Unified, (-1.0,), "xi = -1.0 must be above -1"),
+        (ExtendedUnified, (-0.1, 1.0), "alpha = -0.1 must be from 0 to 1"),
+        (ExtendedUnified, (1.1, 1.0), "alpha = 1.1 must be from 0 to 1"),
+        (ExtendedUnified, (0.5, 0.0), "beta = 0.0 must be above 0"),
+        (DoubleSphere, (1.0, 0.5), "xi = 1.0 must be above -1 and below 1"),
+        (DoubleSphere, (-1.0, 0.5), "xi = -1.0 must be above -1 and below 1"),
+        (DoubleSphere, (0.0, 1.1), "alpha = 1.1 must be from 0 to 1"),
+    ],
+)
+def test_a_coefficient_outside_its_range_is_named(
+    lens: type[CalibratedLens], coefficients: tuple[float, ...], message: str
+) -> None:
+    with pytest.raises(UserError, match=f"coefficients: {message}"):
+        lens(**LANDSCAPE, focal_length=9, coefficients=coefficients)
+
+
+@pytest.mark.parametrize(
+    ("other", "name"),
+    [
+        ("ucm", "unified"),
+        ("mei", "unified"),
+        ("omni", "unified"),
+        ("eucm", "extended_unified"),
+        ("ds", "double_sphere"),
+        ("atan", "fov_model"),
+        ("ftheta", "f_theta"),
+        ("radtan", "brown_conrady"),
+    ],
+)
+def test_the_names_of_other_programs_for_a_lens_suggest_it(other: str, name: str) -> None:
+    with pytest.raises(UserError, match=f"did you mean {name}"):
+        from_camera({"lens": other, "resolution": [96, 64], "focal_length": 9})
+
+
+# r in focal lengths at θ, as the models are published.
+PUBLISHED: dict[type[CalibratedLens], Any] = {
+    Division: lambda c, s, k: 2 * s / (c + mpmath.sqrt(c * c - 4 * k * s * s)),
+    FovModel: lambda c, s, omega: mpmath.atan(2 * s / c * mpmath.tan(omega / 2)) / omega,
+    Unified: lambda c, s, xi: s / (c + xi),
+    ExtendedUnified: lambda c, s, alpha, beta: (
+        s / (alpha * mpmath.sqrt(beta * s * s + c * c) + (1 - alpha) * c)
+    ),
+    DoubleSphere: lambda c, s, xi, alpha: (
+        s / (alpha * mpmath.sqrt(s * s + (xi + c) ** 2) + (1 - alpha) * (xi + c))
+    ),
+    FTheta: lambda c, s, *k: mpmath.polyval([0, 1, *k], mpmath.atan2(s, c), asc=True),
+}
+EXTREMES = [
+    *((Division, (k,)) for k in (-1e6, -0.3, -1e-12, 1e-12, 0.3, 1e6)),
+    *((FovModel, (omega,)) for omega in (1e-9, 0.9, 3.14)),
+    *((Unified, (xi,)) for xi in (-0.999, 0.0, 1e-9, 0.9, 1.0, 1 + 1e-9, 1e6)),
+    *((ExtendedUnified, pair) for pair in ((0, 1), (1, 1e-6), (0.5, 1e6), (0.5 + 1e-9, 1))),
+    *((DoubleSphere, pair) for pair in ((-0.999, 0.01), (0.999, 0.99), (0, 0), (-0.2, 0.6))),
+    *((FTheta, k) for k in ((-0.1, 0, 0, 0), (1e-9, 0, 0, -1e-9), (0, 0, 0, 1e3))),
+]
+
+
+@pytest.mark.parametrize(
+    ("lens_class", "coefficients"), EXTREMES, ids=lambda part: getattr(part, "name", part)
+)
+def test_a_calibrated_lens_has_its_published_radius_at_50_digits(
+    lens_class: type[CalibratedLens], coefficients: tuple[float, ...]
+) -> None:
+    # A pixel is 1 / 1000 of the focal length.
+    lens = lens_class(width=1000, height=1000, focal_length=36, coefficients=coefficients)
+    published, eps = PUBLISHED[lens_class], np.finfo(np.float64).eps
+    seen = 0
+    with mpmath.workdps(50):
+        exact = [mpmath.mpf(float(number)) for number in coefficients]
+        for angle_from_axis in (1e-12, 1e-6, 0.3, 1.2, 1.57, 1.6, 2.0, 2.5, 3.1):
+            s, c = math.sin(angle_from_axis), math.cos(angle_from_axis)
+            theta = mpmath.atan2(mpmath.mpf(s), mpmath.mpf(c))
+
+            def radius(t: Any) -> Any:
+                return published(mpmath.cos(t), mpmath.sin(t), *exact)
+
+            expected, slope = radius(theta), mpmath.diff(radius, theta)
+            pixel = lens.pixels(np.array([0, s, -c]))
+            is_real = all(isinstance(number, mpmath.mpf) for number in (expected, slope))
+            assert np.isfinite(pixel).all() == bool(is_real and expected > 0 and slope > 0)
+            if np.isnan(pixel).any():
+                continue
+            seen += 1
+            # Rounding moves each number of the chain by up to one eps.
+            allowed = 16 * eps * (expected + slope * min(theta, 1) + abs(slope * c * s))
+            assert abs((500 - mpmath.mpf(float(pixel[1]))) / 1000 - expected) < allowed + eps
+            # And back: the pixel's own rounding moves θ by this much.
+            back = lens.rays(*pixel)
+            moved = 16 * eps * (1 + (1 + 1 / 2 + expected) / slope)
+            assert abs(mpmath.atan2(float(back[1]), -float(back[2])) - theta) < moved
+    assert seen >= 2
 
 
 def test_hole_of_a_polynomial_lens() -> None:
@@ -713,6 +969,33 @@ CAMERA_YAML = [
         "focal_length: 10, coefficients: [-0.01, 0.03, -0.02, 0.003]",
         KannalaBrandt(**LANDSCAPE, focal_length=10, coefficients=OPENCV),
     ),
+    (
+        "focal_length: 20, coefficients: [-0.2]",
+        BrownConrady(**LANDSCAPE, focal_length=20, coefficients=(-0.2, *[0.0] * 7)),
+    ),
+    (
+        "focal_length: 20, coefficients: [-0.2, 0.1, 0.001, 0.002, 0.01], fov: 80",
+        BrownConrady(
+            **LANDSCAPE,
+            focal_length=20,
+            coefficients=(-0.2, 0.1, 1e-3, 2e-3, 0.01, 0, 0, 0),
+            fov=math.radians(80),
+        ),
+    ),
+    (
+        "focal_length: 10, coefficients: [0.1, 0, 0.001, 0.002, 0, 0, 0.003, -0.004]",
+        ThinPrismFisheye(
+            **LANDSCAPE, focal_length=10, coefficients=(0.1, 0, 1e-3, 2e-3, 0, 0, 3e-3, -4e-3)
+        ),
+    ),
+    (
+        "focal_length: 10, coefficients: [0.1, 0, 0, 0, 0, 0, 0.001, 0.002, 0.003, 0, 0, 0.004]",
+        Fisheye624(
+            **LANDSCAPE,
+            focal_length=10,
+            coefficients=(0.1, *[0.0] * 5, 1e-3, 2e-3, 3e-3, 0, 0, 4e-3),
+        ),
+    ),
     ("", Equirectangular(**LANDSCAPE)),
     (
         "longitude: [0, 180], latitude: [0, 90]",
@@ -781,20 +1064,20 @@ def test_every_lens_refuses_an_invalid_image(
 
 
 @pytest.mark.parametrize("bad", [0, -1, math.inf, math.nan])
-@pytest.mark.parametrize("name", ["rectilinear", "equisolid 180°", "kannala_brandt"])
+@pytest.mark.parametrize("name", ["rectilinear", "equisolid 180°", *CALIBRATED])
 def test_a_focal_length_is_positive_and_finite(name: str, bad: float) -> None:
     with pytest.raises(UserError, match=r"focal_length: .* must be positive millimetres"):
         replace(EXAMPLES[name], focal_length=bad)
 
 
-@pytest.mark.parametrize("name", ["equisolid 180°", "polynomial", "kannala_brandt"])
+@pytest.mark.parametrize("name", ["equisolid 180°", "polynomial", *SEEING_BEHIND])
 def test_no_fisheye_sees_more_than_a_full_sphere(name: str) -> None:
     assert replace(EXAMPLES[name], fov=2 * math.pi)
     with pytest.raises(UserError, match=r"fov: 360\.001 degrees is not within"):
         replace(EXAMPLES[name], fov=math.radians(360.001))
 
 
-@pytest.mark.parametrize("name", ["polynomial", "kannala_brandt"])
+@pytest.mark.parametrize("name", ["polynomial", *CALIBRATED])
 def test_coefficients_are_complete_and_finite(name: str) -> None:
     right = EXAMPLES[name].coefficients
     ends = (math.nan, math.inf, 1e150, 1e-310)
@@ -828,6 +1111,21 @@ def test_the_smallest_image(name: str) -> None:
             {"lens": "kannala_brandt", "focal_length": 9, "coefficients": [1]},
             "coefficients: is",
         ),
+        *(
+            (
+                {"lens": "brown_conrady", "focal_length": 9, "coefficients": wrong},
+                "coefficients: is .*; must be a list of 1 to 8 values",
+            )
+            for wrong in ([], [0.1] * 9, 0.1)
+        ),
+        (
+            {"lens": "thin_prism_fisheye", "focal_length": 9, "coefficients": [0.1]},
+            "coefficients: is .*; must be a list of 8 values",
+        ),
+        (
+            {"lens": "fisheye624", "focal_length": 9, "coefficients": [0.1] * 8},
+            "coefficients: is .*; must be a list of 12 values",
+        ),
         ({"lens": "equirectangular", "latitude": [10, -10]}, "latitude"),
         ({"lens": "equirectangular", "latitude": [-100, 0]}, "latitude"),
         ({"lens": "equirectangular", "longitude": [-180, 181]}, "longitude"),
@@ -844,6 +1142,7 @@ def test_an_impossible_lens_is_refused(camera: dict[str, object], message: str) 
 
 OF_POLYNOMIAL = {"lens": "polynomial", "coefficients": [0, -0.1, 0, 0, 0]}
 OF_OPENCV = {"lens": "kannala_brandt", "focal_length": 9, "coefficients": [0, 0, 0, 0]}
+OF_BROWN = {"lens": "brown_conrady", "focal_length": 9, "coefficients": [-0.1]}
 EQUISOLID, PINHOLE = {"lens": "equisolid", "focal_length": 9}, {"lens": "rectilinear"}
 
 
@@ -862,6 +1161,8 @@ EQUISOLID, PINHOLE = {"lens": "equisolid", "focal_length": 9}, {"lens": "rectili
         (EQUISOLID, "fov", [0.5, 360], [0, 360.5]),
         (OF_POLYNOMIAL, "fov", [0.5, 360], [0, 360.5]),
         (OF_OPENCV, "fov", [0.5, 360], [0, 360.5]),
+        (OF_BROWN, "fov", [0.5, 180], [0, 180.5]),
+        (OF_BROWN, "coefficients", [[0.1], [0.1] * 8], []),
         ({"lens": "equirectangular"}, "longitude", [[-180, 180]], [[-180.5, 0], [0, 180.5]]),
         ({"lens": "equirectangular"}, "latitude", [[-90, 90]], [[-90.5, 0], [0, 90.5]]),
     ],
@@ -944,6 +1245,33 @@ def test_all_readers_have_the_same_limit_for_a_field_of_view(
         (
             "11,24,-.01,.03,-.02,.003,3",
             KannalaBrandt(**SENSOR, focal_length=11, coefficients=OPENCV, fov=3),
+        ),
+        ("11,24,-.35", Division(**SENSOR, focal_length=11, coefficients=(-0.35,))),
+        ("11,24,.9", FovModel(**SENSOR, focal_length=11, coefficients=(0.9,))),
+        ("11,24,-.1,2", Unified(**SENSOR, focal_length=11, coefficients=(-0.1,), fov=2)),
+        ("11,24,.6,1.1", ExtendedUnified(**SENSOR, focal_length=11, coefficients=(0.6, 1.1))),
+        (
+            "11,24,-.17,.6,100deg",
+            DoubleSphere(
+                **SENSOR, focal_length=11, coefficients=(-0.17, 0.6), fov=math.radians(100)
+            ),
+        ),
+        ("11,24,-.1,0,.02,0", FTheta(**SENSOR, focal_length=11, coefficients=(-0.1, 0, 0.02, 0))),
+        (
+            "11,24,8.1,4.2,1e-3,-8e-4,.2,8.4,6.1,1",
+            BrownConrady(**SENSOR, focal_length=11, coefficients=RATIONAL),
+        ),
+        (
+            "11,24,8.1,4.2,1e-3,-8e-4,.2,8.4,6.1,1,120deg",
+            BrownConrady(**SENSOR, focal_length=11, coefficients=RATIONAL, fov=math.radians(120)),
+        ),
+        (
+            "11,24,-.01,.03,2e-3,-1e-3,-.02,.003,3e-3,-2e-3,3",
+            ThinPrismFisheye(**SENSOR, focal_length=11, coefficients=THIN_PRISM, fov=3),
+        ),
+        (
+            "11,24,-.027,.102,-.072,.0125,1.2e-3,-4e-4,5e-3,-4e-3,-2e-3,-4e-4,3e-3,1e-4",
+            Fisheye624(**SENSOR, focal_length=11, coefficients=OF_624),
         ),
         ("180deg", Equidistant(**LANDSCAPE, fov=math.pi)),
         ("9,24,90deg", Equisolid(**SENSOR, focal_length=9, fov=math.pi / 2)),

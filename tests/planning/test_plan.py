@@ -1,6 +1,7 @@
 """The plan before anything is rendered: the number of views, time and disk space."""
 
 import json
+import math
 import re
 import shutil
 from dataclasses import replace
@@ -251,6 +252,65 @@ def test_a_partition_that_ends_jobs_before_their_first_view_is_a_warning(tmp_pat
     assert not warnings("2")
     # A GPU is expected to be as fast as 64 cores.
     assert not warnings("2", "partition_minutes=40", "device=optix")
+
+
+CLIPPED = """
+licence: CC0-1.0
+scene: {builder: room}
+render: {samples: 4}
+rigs:
+  LFPlane:
+    type: plane
+    cameras: [2, 1]
+    size: 0.5
+    camera: {lens: equidistant, fov: 180, resolution: [24, 24]}
+reprojections:
+  sphere: {camera: &camera {lens: double_sphere, focal_length: 6, resolution: [96, 96],
+    coefficients: [-0.172, 0.593]}, format: png}
+  chosen: {camera: {<<: *camera, fov: 252}, format: png}
+"""
+
+
+def test_a_lens_that_ends_inside_its_image_is_a_warning_that_names_fov(tmp_path):
+    folder = checkout(tmp_path, clipped=CLIPPED)
+    plan = snakemake(folder, "-n", "--config", "scenes=[clipped]", "preset=full", "rigs=all")
+    assert plan.returncode == 0, plan.stderr
+    (warning,) = (line for line in plan.stderr.splitlines() if line.startswith("warning"))
+    assert warning.startswith("warning: clipped/LFPlane/sphere: the double-sphere fisheye ends at ")
+    # The limit of the double sphere, and the area outside a circle of this radius.
+    angle, radius, share = map(float, re.findall(r"([\d.]+)(?:°| focal| %)", warning))
+    assert abs(angle - 126.15) < 0.1
+    assert abs(radius - 2.319) < 0.001
+    assert abs(share - 100 * (1 - math.pi * (radius * 6 / 36) ** 2)) < 1
+    assert warning.endswith("choose a smaller limit by fov")
+
+
+@pytest.mark.parametrize(
+    ("camera", "said"),
+    [
+        (
+            "{lens: stereographic, fov: 359, resolution: [2048, 2048]}",
+            ["stereographic fisheye, 359°", "0.62 pixels"],
+        ),
+        (
+            "{lens: brown_conrady, focal_length: 15, coefficients: [-0.3, 0, 0.002, -0.001],"
+            " resolution: [752, 480]}",
+            ["Brown–Conrady lens"],
+        ),
+    ],
+    ids=["steep", "folds"],
+)
+def test_a_lens_that_would_err_visibly_is_refused_before_the_first_job(tmp_path, camera, said):
+    scene = CLIPPED.replace("{lens: equidistant, fov: 180, resolution: [24, 24]}", camera)
+    folder = checkout(tmp_path, clipped=scene)
+    arguments = ("--config", "scenes=[clipped]", "preset=full", "rigs=all")
+    run = snakemake(folder, "--cores", "1", *arguments)
+    assert run.returncode
+    (error,) = (line for line in run.stderr.splitlines() if line.startswith("error: "))
+    assert error.startswith("error: clipped/LFPlane: camera: ")
+    for words in (*said, "smaller fov"):
+        assert words in error
+    assert not list(folder.rglob("*.blend"))
 
 
 def phases(folder, *arguments):

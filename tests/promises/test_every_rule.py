@@ -28,6 +28,7 @@ description: Cameras in a room
 scene:
   builder: room
   frame: 1
+  targets: {{board: {{type: chessboard, squares: [4, 3], square: 0.04}}}}
 render: {{samples: 4}}
 report: {{panorama: true}}
 rigs:
@@ -457,6 +458,9 @@ ROUNDS = {
     "the frame, and the scene": {
         "built": ("frame: 1", "frame: 2", {"inventory", "mesh"} | CAMERAS),
         "brought": ("scene_name: First", "scene_name: Second", {"inventory", "free_places"}),
+    },
+    "a board": {
+        "built": ("square: 0.04", "square: 0.05", {"inventory", "mesh"} | CAMERAS),
     },
     "what follows the camera": {
         "brought": (

@@ -22,6 +22,7 @@ scene:
   blend: scene.blend
   url: https://example.org/scene.blend
   sha256: "0000000000000000000000000000000000000000000000000000000000000000"
+  targets: {board: {type: chessboard, squares: [4, 3], square: 0.04}}
 render: {target_error: 0.1}
 rigs:
   LFPlane:

@@ -89,6 +89,27 @@ def test_changed_settings_run_their_jobs_again(tmp_path):
     assert "build_scene" not in said.split()
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("in_forks")
+def test_the_files_of_an_inertial_sensor_reach_the_job_that_checks_them(tmp_path):
+    build = Cloud(tmp_path / "cloud", 2, str(tmp_path / "store"))
+    scene = tmp_path / "cloud/configs/scenes/soak.yaml"
+    content = yaml.safe_load(scene.read_text())
+    rig = {
+        "type": "path",
+        "count": 2,
+        "keys": [{"position": [0, 0, 1.2]}, {"position": [0, 0.3, 1.2]}],
+        "camera": {"lens": "rectilinear", "fov": 80, "resolution": [16, 16]},
+        "imu": {"seconds": 1},
+    }
+    kept = {key: content[key] for key in ("licence", "scene") if key in content}
+    scene.write_text(json.dumps(kept | {"render": {"samples": 1}, "rigs": {"walk": rig}}))
+    sums = "results/soak/walk/sha256sums.txt"
+    said, _ = (run := build.start("--", sums)).communicate()
+    assert run.returncode == 0, said
+    assert "  imu/imu.csv\n" in (tmp_path / "store" / sums).read_text()
+
+
 # A room with a texture on its walls, and a box from a linked library with another texture.
 BLEND = """
 import sys

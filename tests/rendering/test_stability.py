@@ -43,6 +43,11 @@ def test_the_reference_inverts_itself_to_all_its_digits() -> None:
         ["rectilinear 1e-6 mm", "equidistant 360°", "polynomial turning"],
         ["equisolid 360°", "kannala_brandt turning", "equirectangular 0.01°"],
         ["orthographic 180°", "polynomial turned 220°", "equirectangular odd"],
+        ["division barrel", "division turning", "fov_model", "fov_model 3.1", "equidistant 360°"],
+        ["unified 0.9", "unified turning", "double_sphere 0.999", "f_theta turning"],
+        ["extended_unified turning", "extended_unified 0.3", "double_sphere turning", "cube map"],
+        ["brown_conrady turning", "thin_prism_fisheye 360°", "thin_prism_fisheye turning"],
+        ["brown_conrady rational", "fisheye624 turning", "fisheye624 folding", "equidistant 360°"],
     ],
 )
 def test_lens_pairs_are_within_their_bounds(chosen: list[str]) -> None:

@@ -559,6 +559,15 @@ def test_a_warning_is_printed_once(dataset, run, capsys):
         ("--equirectangular=-1,1,-0.5,0.5",),
         ("--polynomial", "0,-0.07,0,0,0,36,3"),
         ("--kannala-brandt", "9,36,0.01,0,0,0"),
+        ("--brown-conrady", "22,36,-0.2,0.05,0.003,-0.002,0,0,0,0"),
+        ("--thin-prism-fisheye", "9,36,-0.01,0.01,0.003,-0.002,0,0,0.004,-0.003"),
+        ("--fisheye624", "9,36,-0.01,0.01,0,0,0,0,0.003,-0.002,0.004,0,-0.003,0"),
+        ("--division", "12,36,-0.2"),
+        ("--fov-model", "12,36,0.9"),
+        ("--unified", "20,36,0.9"),
+        ("--extended-unified", "11,36,0.6,1.1"),
+        ("--double-sphere", "11,36,-0.2,0.6"),
+        ("--f-theta", "9,36,-0.01,0.02,0,-0.001"),
     ],
 )
 def test_every_lens_is_a_target_and_a_source(dataset, run, flags):

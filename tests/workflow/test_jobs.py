@@ -24,6 +24,7 @@ rigs:
   LFTest: {{type: plane, cameras: [2, 1], size: 1, camera: {CAMERA}, split: test}}
   LFTrain: {{type: plane, cameras: [3, 2], size: 1, camera: {CAMERA}, split: train}}
   LFRandom: {{type: random, count: 2, size: 1, camera: {CAMERA}, split: odd}}
+  LFHead: {{type: lattice, cameras: [2, 1, 1], head: {{left: {{camera: {CAMERA}}}}}}}
 reprojections:
   perspective:
     camera: {{lens: rectilinear, fov: 60, resolution: [8, 8]}}

@@ -15,7 +15,7 @@ RIG = "smoke/LFCuboid_1x1x1"
 SEQUENCE = "garden_sequence/LFCuboid_8panos"
 # What a job reads, and the receipt of the job that made it. A mark says that a bundle comes along.
 MADE = {
-    f"results/{RIG}/lightfield.json": f"{RIG}/lightfield",
+    f"results/{RIG}/lightfield.json": f"{RIG}/lightfield +",
     f"results/{RIG}/perspective/lightfield.json": f"{RIG}/perspective/lightfield",
     f"results/{RIG}/perspective/transforms.json": f"{RIG}/perspective/export_instant_ngp +",
     f"results/{RIG}/transforms.json": f"{RIG}/export_instant_ngp +",

@@ -25,9 +25,11 @@ from lightfield.settings.types import AtLeastOne
 
 # The keys of a scene YAML's `scene` block that lightfield.json records. Paths and URLs are not
 # among them.
-_SOURCE_KEYS = {"builder", "parameters", "scene_name", "view_layers", "followed_camera", "frame"}
+_SOURCE_KEYS = {
+    *("builder", "parameters", "scene_name", "view_layers", "followed_camera", "frame", "targets"),
+}
 # The same for a model.
-_MODEL_SOURCE_KEYS = {"frame", *scene_source.MODEL_KEYS}
+_MODEL_SOURCE_KEYS = {"frame", "targets", *scene_source.MODEL_KEYS}
 # The keys on which a lightfield.json depends. It depends on the SHA-256 in the YAML, if any.
 _CAPTURED_KEYS = _SOURCE_KEYS | {"blend", "model", "dataset", "sha256", *scene_source.MODEL_KEYS}
 

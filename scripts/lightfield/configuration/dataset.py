@@ -203,6 +203,15 @@ class Dataset(Capture):
         return None if self.imported else self.paths.cameras
 
     @property
+    def corners(self) -> str | None:
+        """The corners of the calibration boards, if the scene has any.
+
+        An omnidirectional stereo view has no centre, and therefore no corners.
+        """
+        has_corners = self.source.targets and not self.rig.is_omnidirectional
+        return self.paths.corners if has_corners else None
+
+    @property
     def panorama(self) -> str | None:
         """The report's panorama. An import has none, because it has no scene to render."""
         return self.paths.panorama if self.has_panorama and not self.imported else None
@@ -211,6 +220,11 @@ class Dataset(Capture):
     def splits(self) -> str | None:
         """The list of the views that train, validate and test, if this rig has a split."""
         return self.paths.splits if self.rig.split else None
+
+    @property
+    def heads(self) -> str | None:
+        """The list of the scene's heads, if this rig is a camera of one."""
+        return self.paths.heads if self.rig.mount else None
 
     @property
     def mesh_list(self) -> str | None:
@@ -326,8 +340,8 @@ class Dataset(Capture):
 
     @property
     def published(self) -> list[str]:
-        """The light fields, and the lists of exports, mesh and video. One job makes each."""
-        lists = [*_present(self.mesh_list), *_present(self.video_list)]
+        """The light fields, corners, and lists of exports, mesh and video. One job makes each."""
+        lists = _present(self.corners, self.mesh_list, self.video_list)
         return [*self.lightfields, *self.exported, *lists]
 
     @property
@@ -341,7 +355,7 @@ class Dataset(Capture):
         return [
             paths.validation,
             paths.sums,
-            *_present(self.splits),
+            *_present(self.splits, self.heads),
             *self.published,
             *self.sequence_exports,
             *_present(self.sequence_sums),

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 from lightfield.configuration.publication import DOCUMENTS, PUBLISHED_FOLDER
-from lightfield.core.names import MESH, SEQUENCE_PAGE, SPLITS, VIDEO, VIEWS
+from lightfield.core.names import HEADS, MESH, SEQUENCE_PAGE, SPLITS, VIDEO, VIEWS
 from lightfield.engine.receipts import FOLDER, SUFFIX
 from lightfield.exporters import list_path
 from lightfield.formats.export_lists import MANIFEST
+from lightfield.formats.layout import CORNERS
 
 # The pictures of a report.
 PICTURES = ("overview", "contact_sheet", "rig", "depth", "noise")
@@ -96,6 +97,11 @@ class Paths:
         """The list of the views that train, validate and test."""
         return f"{self.scene_results}/{SPLITS}"
 
+    @property
+    def heads(self) -> str:
+        """The list of the scene's heads: cameras on one body, and what they take at each place."""
+        return f"{self.scene_results}/{HEADS}"
+
     # Files of a rig.
 
     @property
@@ -128,6 +134,11 @@ class Paths:
     def cameras(self) -> str:
         """The report on the cameras: the space around each of them."""
         return f"{self.work}/cameras.json"
+
+    @property
+    def corners(self) -> str:
+        """The corners of the calibration boards in each view."""
+        return f"{self.folder}/{CORNERS}"
 
     @property
     def probe(self) -> str:

@@ -21,7 +21,7 @@ from lightfield.configuration import own_builder
 from lightfield.configuration.scene_source import Parameters, SceneSource
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
-from lightfield.core.names import BUILDERS, SOFTBOXES
+from lightfield.core.names import BUILDERS, IMU, SOFTBOXES
 from lightfield.core.paths import files_below
 from lightfield.formats import published
 from lightfield.formats.lightfield import MACHINE, MODEL_PLACEMENT, RIG_FIT, LightField, View
@@ -137,7 +137,7 @@ def model_fingerprint(options: Mapping[str, Any], files: Sequence[tuple[str, str
 
 # The keys of lightfield.json that change no view. Views are light, whatever look is given to
 # versions of them. A model's fingerprint says how it is placed, and the poses where the rig is.
-_NOT_OF_VIEWS = (MACHINE, FILE_LOOK, MODEL_PLACEMENT, RIG_FIT)
+_NOT_OF_VIEWS = (MACHINE, FILE_LOOK, MODEL_PLACEMENT, RIG_FIT, IMU)
 
 
 def render_key(lightfield: LightField, view: View) -> str:

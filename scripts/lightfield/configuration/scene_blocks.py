@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field
 
 from lightfield.configuration.family import Family
+from lightfield.configuration.heads import with_cameras
 from lightfield.configuration.publication import Credits
 from lightfield.configuration.render_settings import Render
 from lightfield.configuration.reprojections import (
@@ -104,7 +105,7 @@ class SceneBlocks(Credits):
         None,
         description="How Cycles renders the views. Required, but not allowed with scene.dataset.",
     )
-    rigs: dict[Name, AnyRig] = Field(
+    rigs: Annotated[dict[Name, AnyRig], AfterValidator(with_cameras)] = Field(
         {},
         min_length=1,
         description="Camera setups, by the names of their folders. Leave it out with "

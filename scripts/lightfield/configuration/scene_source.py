@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, WrapValidator, model
 
 from lightfield.configuration import own_builder
 from lightfield.core.names import FILE, LIGHTS, MODELS, SOFTBOXES, UP, builders
+from lightfield.geometry.boards import Boards
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.settings.base import AS_WRITTEN, Address, Settings, pattern
 from lightfield.settings.types import QUOTED
@@ -214,6 +215,11 @@ class Origin(Settings):
     )
     page: Address | None = Field(
         None, description="Web page from which you can download the .blend file by hand."
+    )
+    targets: Boards | None = Field(
+        None,
+        description="Calibration boards that are added to the scene, by their names. A .blend file "
+        "itself stays as it is. Each dataset gets corners.json.",
     )
 
 

@@ -13,6 +13,7 @@ from typing import Any, Self
 from pydantic import TypeAdapter, ValidationError, model_validator
 
 from lightfield.configuration.family import Family, stand_in
+from lightfield.configuration.heads import keys_as_written
 from lightfield.configuration.misplaced_keys import with_place
 from lightfield.configuration.scene_blocks import SceneBlocks
 from lightfield.configuration.scene_checks import (
@@ -153,7 +154,9 @@ def mistake(scene: str, problem: str) -> UserError:
     """Return the error for a mistake in a scene YAML, with the line of the problem's key."""
     path = scene_path(scene)
     file = _shown(path)
-    return UserError(_located_in_family(problem, read_settings_text(path, file), file))
+    text = read_settings_text(path, file)
+    problem = keys_as_written(problem, parse_yaml(text, file))
+    return UserError(_located_in_family(problem, text, file))
 
 
 def _shown(path: Path) -> str:
@@ -175,7 +178,8 @@ def _checked_scene(text: str, file: str, _folder: Path) -> Scene:
     locate = _located_in_family if is_family else located
 
     def located_key(problem: str) -> str:
-        return locate(with_place(problem, Scene.model_fields), text, file)
+        problem = keys_as_written(with_place(problem, Scene.model_fields), content)
+        return locate(problem, text, file)
 
     return checked_yaml(_SCENE, content, located_key)
 

@@ -12,9 +12,14 @@ RENDERED = "render"
 MESH = "mesh"
 # The folder of a dataset with its turntable or walk.
 VIDEO = "video"
+# The folder of a dataset with the files of an inertial sensor (IMU), and the key of its settings in
+# lightfield.json.
+IMU = "imu"
 
 # The file that lists which of a scene's views are in which part of the split.
 SPLITS = "splits.json"
+# The file that lists which views the cameras of a head take at the same place.
+HEADS = "heads.json"
 Part = Literal["train", "validation", "test"]
 PARTS: tuple[Part, ...] = get_args(Part)
 

@@ -2,7 +2,10 @@
 
 import math
 
+import numpy as np
+
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -11,8 +14,10 @@ from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 
-def focal_pixels(lens: Rectilinear | CalibratedLens) -> tuple[float, float]:
+def focal_pixels(lens: Rectilinear | CalibratedLens | Equidistant) -> tuple[float, float]:
     """Return a lens's focal length in pixels, across and down."""
+    if isinstance(lens, Equidistant):
+        return lens.width / lens.fov, lens.height / lens.fov
     return (
         lens.focal_length * lens.width / lens.sensor[0],
         lens.focal_length * lens.height / lens.sensor[1],
@@ -27,8 +32,44 @@ def opencv_fisheye(lens: Lens) -> tuple[float, ...]:
     if isinstance(lens, KannalaBrandt):
         return (*focal_pixels(lens), *lens.coefficients)
     if isinstance(lens, Equidistant):
-        return (lens.width / lens.fov, lens.height / lens.fov, 0.0, 0.0, 0.0, 0.0)
+        return (*focal_pixels(lens), 0.0, 0.0, 0.0, 0.0)
     raise TypeError(f"{type(lens).__name__} is not a fisheye of OpenCV's")
+
+
+def distortion(lens: BrownConrady) -> dict[str, float]:
+    """Return OpenCV's coefficients k1 to k6, p1 and p2 by their names."""
+    return dict(zip(lens.coefficient_names, lens.coefficients, strict=True))
+
+
+def has_denominator(lens: BrownConrady) -> bool:
+    """Return whether a lens has OpenCV's k4 to k6, which most programs do not know."""
+    named = distortion(lens)
+    return any(named[name] for name in ("k4", "k5", "k6"))
+
+
+def sees_sideways(lens: Lens) -> bool:
+    """Return whether the image has a ray at 90° from the optical axis or beyond."""
+    azimuth = np.linspace(0, 2 * math.pi, 720, endpoint=False)
+    pixels = lens.pixels(np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=-1))
+    # An image circle that touches the frame is in it, rounded or not.
+    with np.errstate(invalid="ignore"):
+        in_frame = (pixels > -1e-6) & (pixels < np.array([lens.width, lens.height]) + 1e-6)
+    corners = lens.rays([0, 0, lens.width, lens.width], [0, lens.height, 0, lens.height])
+    return bool(in_frame.all(axis=-1).any() or (corners[:, 2] >= 0).any())
+
+
+def largest_angle(lens: CalibratedLens) -> float:
+    """Return the largest angle in radians from the axis that the image of a radial lens shows."""
+    corners = lens.rays([0, 0, lens.width, lens.width], [0, lens.height, 0, lens.height])
+    angles = np.arctan2(np.hypot(corners[:, 0], corners[:, 1]), -corners[:, 2])
+    if np.isfinite(angles).all():
+        return float(angles.max())
+    # The image shows the lens's rim.
+    least, most = 0.0, math.pi
+    while least < (middle := (least + most) / 2) < most:
+        ray = np.array([math.sin(middle), 0, -math.cos(middle)])
+        least, most = (middle, most) if np.isfinite(lens.pixels(ray)[0]) else (least, middle)
+    return least
 
 
 def misreading(lens: Lens) -> str | None:

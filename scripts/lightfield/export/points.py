@@ -78,7 +78,7 @@ def _points_of(source: SourceDataset, view: View, surface: SeenSurface, step: in
     """Return the points of a surface at every ``step``-th pixel that the ``view`` shows."""
     positions, normals = surface.points(step)
     local = view.to_camera(positions)
-    column, row, inside = pixel_indices(source.lens, local)
+    column, row, inside = pixel_indices(source.view(view).lens, local)
     inside &= source.valid(view)[row, column]
     return Points(positions, source.colour(view)[row, column], normals).chosen(inside)
 
@@ -89,10 +89,11 @@ def observations(source: SourceDataset, points: Points) -> list[Observations]:
     progress = Progress(len(source.lightfield.views), "tracks", "views")
     for view, surface in source.surfaces(source.lightfield.views):
         local = view.to_camera(points.positions)
-        column, row, inside = pixel_indices(source.lens, local)
+        lens = source.view(view).lens
+        column, row, inside = pixel_indices(lens, local)
         inside &= source.valid(view)[row, column] & surface.sees(points.positions)
         indices = np.flatnonzero(inside)
-        seen_points.append(Observations(indices, source.lens.pixels(local[indices])))
+        seen_points.append(Observations(indices, lens.pixels(local[indices])))
         progress.done()
     return seen_points
 

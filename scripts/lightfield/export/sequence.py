@@ -91,6 +91,11 @@ class SourceSequence:
         return self.lightfield.lens
 
     @property
+    def lenses(self) -> dict[Lens, Path]:
+        """The different lenses of the views, each with a lightfield.json that has it."""
+        return self.frames[0].lenses
+
+    @property
     def has_depth(self) -> bool:
         return self.frames[0].has_depth
 

@@ -81,10 +81,6 @@ class SourceDataset:
         views = {view.name: view for view in own.views}
         for rig, folder in self.beside.items():
             other = OpenDataset.in_folder(folder, name, suffix)
-            if other.lens != own.lens:
-                raise UserError(
-                    f"{other.lightfield.path}: camera: must be the same as in {own.lightfield.path}"
-                )
             named = {f"{rig}_{view.name}": view for view in other.views}
             if taken := views.keys() & named.keys():
                 raise UserError(
@@ -102,7 +98,17 @@ class SourceDataset:
 
     @property
     def lens(self) -> Lens:
+        """The lens of the views. If they have several, the first view's."""
         return self.lightfield.lens
+
+    @property
+    def lenses(self) -> dict[Lens, Path]:
+        """The different lenses of the views, each with a lightfield.json that has it."""
+        lenses: dict[Lens, Path] = {}
+        for view in self.lightfield.views:
+            dataset = self.view(view).dataset
+            lenses.setdefault(dataset.lens, dataset.lightfield.path)
+        return lenses
 
     @property
     def has_depth(self) -> bool:

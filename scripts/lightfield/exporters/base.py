@@ -15,10 +15,10 @@ from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.core.names import PARTS, VIEWS
 from lightfield.engine.stage import cause
+from lightfield.export import cameras
 from lightfield.formats.layout import Manifest
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
-from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import BlendCamera, Rig
 from lightfield.imaging import blender_looks
@@ -120,6 +120,10 @@ class Export(Settings, ABC):
         """
         return None
 
+    def joins(self, lens: Lens, other: Lens) -> bool:
+        """Return whether one export can have views of both lenses."""
+        return lens == other
+
     def rig_refusal(self, rig: Rig) -> str | None:
         """Return why the consumer cannot take the views of a rig. None if it can."""
         if self.is_of_sequence and isinstance(rig, BlendCamera):
@@ -141,6 +145,29 @@ class Export(Settings, ABC):
 
         For an export beside the views, it is the folder of their lightfield.json.
         """
+
+
+class Joined(Export):
+    """Exports that may have the views of several rigs."""
+
+    # Settings name the folders of these rigs, so this changes no file of an export either.
+    together: Annotated[list[str], AfterValidator(unique_names)] | None = Field(
+        None,
+        min_length=2,
+        exclude=True,
+        description="In place of rigs: rigs whose views go into one export, in the folder of the "
+        "first. Names of the other rigs' views begin with the name of their rig.",
+    )
+
+    @model_validator(mode="after")
+    def _alone_or_together(self) -> Self:
+        if self.rigs and self.together:
+            raise ValueError("must have rigs or together, not both")
+        return self
+
+    @property
+    def joined_rigs(self) -> list[str]:
+        return self.together or []
 
 
 class Developed(Export):
@@ -169,33 +196,23 @@ class Developed(Export):
         return {key: value for key, value in super().recorded.items() if key != "look"}
 
 
-class ForTraining(Developed):
+class ForTraining(Joined, Developed):
     """Exports to train with, which may have the views of several rigs."""
 
     is_for_training = True
 
-    # Settings name the folders of these rigs, so this changes no file of an export either.
-    together: Annotated[list[str], AfterValidator(unique_names)] | None = Field(
-        None,
-        min_length=2,
-        exclude=True,
-        description="In place of rigs: rigs whose views go into one export, in the folder of the "
-        "first. Names of the other rigs' views begin with the name of their rig.",
-    )
 
-    @model_validator(mode="after")
-    def _alone_or_together(self) -> Self:
-        if self.rigs and self.together:
-            raise ValueError("must have rigs or together, not both")
-        return self
-
-    @property
-    def joined_rigs(self) -> list[str]:
-        return self.together or []
-
-
-def angle(lens: Equidistant | KannalaBrandt) -> str:
+def angle(lens: Equidistant) -> str:
     return f"sees {math.degrees(lens.fov):g} degrees"
+
+
+def sideways_refusal(lens: Lens, program: str) -> str | None:
+    """Return why a program whose lenses end below 180° cannot take a lens. None if it can."""
+    if isinstance(lens, Equidistant) and lens.fov >= math.pi:
+        return f"{angle(lens)}, but {program} fisheye ends below 180; give it a smaller fov"
+    if not isinstance(lens, Rectilinear | Equidistant) and cameras.sees_sideways(lens):
+        return f"sees 90 degrees from its axis, where {program} lenses end; give it a fov below 180"
+    return None
 
 
 def odd_size_refusal(lens: Lens) -> str | None:

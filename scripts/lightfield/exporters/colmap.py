@@ -1,19 +1,21 @@
 """Writes a COLMAP model, for gsplat, 3DGRUT, Brush and the original 3D Gaussian splatting.
 
-- ``sparse/0/``: cameras, images and points3D, in binary or as text.
+- ``sparse/0/``: cameras, images and points3D, in binary or as text. For the cameras of a head also
+  rigs and frames. Their images lie in a folder for each camera, with equal names.
 - ``images/``: the views as 8-bit PNG.
 - ``masks/<image>.png``: for views with pixels that show nothing. 0 means ignored.
 - ``stereo/depth_maps/<image>.geometric.bin``: Z-depth in metres, if the settings ask for it.
 
-Poses are world to camera, with x right, y down and z forward. Points are lifted from depth. Each
+Poses are world to camera, with x right, y down and z forward. The first camera of a head is its
+rig's reference. Points are lifted from depth. Each
 has the views that see it. One view is enough, because depth says where the point is. Source:
-COLMAP's format.rst, scene/reconstruction_io and sensor/models.h.
+COLMAP's format.rst, scene/reconstruction_io, sensor/rig.h and sensor/models.h.
 """
 
-import math
 import struct
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal
@@ -23,7 +25,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from lightfield.core.files import atomic_path
-from lightfield.export import cameras
+from lightfield.export import cameras, heads
 from lightfield.export.pictures import write_pictures
 from lightfield.export.points import (
     Observations,
@@ -35,19 +37,61 @@ from lightfield.export.points import (
 )
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ForTraining, PointCount, angle
+from lightfield.exporters.base import (
+    NO_DEPTH,
+    TO_RECTILINEAR,
+    ForTraining,
+    PointCount,
+    sideways_refusal,
+)
 from lightfield.formats.lightfield import View
-from lightfield.geometry.colmap import pose
+from lightfield.geometry.colmap import pose, relative_pose
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
+from lightfield.geometry.lenses.calibrated import CalibratedLens
+from lightfield.geometry.lenses.division import Division
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.extended_unified import ExtendedUnified
+from lightfield.geometry.lenses.fisheye624 import Fisheye624
+from lightfield.geometry.lenses.fov_model import FovModel
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.lenses.thin_prism_fisheye import ThinPrismFisheye
+from lightfield.geometry.lenses.unified import Unified
 
 PINHOLE = (1, "PINHOLE")
+OPENCV = (4, "OPENCV")
 OPENCV_FISHEYE = (5, "OPENCV_FISHEYE")
+FULL_OPENCV = (6, "FULL_OPENCV")
+EUCM = (16, "EUCM")
 # Whole panoramas. Since COLMAP 4.1.
 EQUIRECTANGULAR = (17, "EQUIRECTANGULAR")
+# COLMAP has the coefficients of these lenses in the same order.
+_CALIBRATED: dict[type[Lens], tuple[int, str]] = {
+    KannalaBrandt: OPENCV_FISHEYE,
+    FovModel: (7, "FOV"),
+    ThinPrismFisheye: (10, "THIN_PRISM_FISHEYE"),
+    Fisheye624: (11, "RAD_TAN_THIN_PRISM_FISHEYE"),
+    Division: (13, "DIVISION"),
+    ExtendedUnified: EUCM,
+}
+_ALL: tuple[type[Lens], ...] = (
+    *(Rectilinear, Equidistant, Equirectangular, BrownConrady, Unified),
+    *_CALIBRATED,
+)
+# Who does not read a model, but reads the others of COLMAP's.
+_NOT_READ_BY = {
+    "FULL_OPENCV": "gsplat stops at",
+    "FOV": "gsplat and 3DGRUT stop at, and Brush takes for a pinhole",
+    "THIN_PRISM_FISHEYE": "gsplat and 3DGRUT stop at",
+    "RAD_TAN_THIN_PRISM_FISHEYE": "gsplat, 3DGRUT and Brush stop at",
+    "DIVISION": "gsplat, 3DGRUT and Brush stop at",
+    "EUCM": "gsplat, 3DGRUT and Brush stop at",
+}
+
+# COLMAP's type of the sensors of a rig.
+_CAMERA_SENSOR = 0
 
 # A file beside the model, if the scene has a split: the names of the test images, one per line. The
 # original 3D Gaussian splatting reads it.
@@ -66,24 +110,23 @@ class ColmapModel(ForTraining):
     depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if isinstance(lens, Equidistant | KannalaBrandt):
-            # COLMAP projects only points in front of the camera.
-            if lens.fov >= math.pi:
-                return f"{angle(lens)}, but COLMAP's fisheye ends below 180; give it a smaller fov"
-        elif isinstance(lens, Equirectangular):
+        if isinstance(lens, Equirectangular):
             if not lens.is_full:
                 return f"is a part of a panorama; COLMAP takes whole ones; {TO_RECTILINEAR}"
             if self.depth:
                 return "is a panorama, for which COLMAP has no depth maps; leave out depth: true"
-        elif not isinstance(lens, Rectilinear):
+        elif not isinstance(lens, _ALL):
             return f"has a lens that COLMAP lacks; {TO_RECTILINEAR}, or equidistant below 180°"
+        # The models of all other lenses project only points in front of the camera.
+        elif not isinstance(lens, Division) and (refusal := sideways_refusal(lens, "COLMAP's")):
+            return refusal
         return NO_DEPTH if self.depth and not has_depth else None
 
     def write_model(self, source: SourceDataset, folder: Path) -> None:
         """Write the model of a source's views into ``folder``."""
-        problem = cameras.misreading(source.lens)
-        if problem:
-            print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
+        for lens in source.lenses:
+            if problem := misreading(lens):
+                print(f"warning: {source.lightfield.path}: camera: {problem}", file=sys.stderr)
         views = source.lightfield.views
         if any(view.split for view in views):
             tests = [f"{view.name}.png\n".encode() for view in splits(source.lightfield).test]
@@ -108,9 +151,12 @@ class Colmap(ColmapModel):
     loader = "import pycolmap\nmodel = pycolmap.Reconstruction('{}/sparse/0')"
     needs_surfaces = True
 
+    def joins(self, lens: Lens, other: Lens) -> bool:
+        return True
+
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write the model of a source's views into ``folder``."""
-        self.write_model(source, folder)
+        self.write_model(heads.by_camera(source), folder)
 
 
 def model(source: SourceDataset, count: int) -> "Model":
@@ -145,8 +191,32 @@ def camera(lens: Lens) -> tuple[tuple[int, str], list[float]]:
         return PINHOLE, [*cameras.focal_pixels(lens), *lens.center]
     if isinstance(lens, Equirectangular):
         return EQUIRECTANGULAR, [float(lens.width), float(lens.height)]
-    fx, fy, *distortion = cameras.opencv_fisheye(lens)
-    return OPENCV_FISHEYE, [fx, fy, *lens.center, *distortion]
+    if isinstance(lens, Equidistant):
+        fx, fy, *distortion = cameras.opencv_fisheye(lens)
+        return OPENCV_FISHEYE, [fx, fy, *lens.center, *distortion]
+    assert isinstance(lens, CalibratedLens)
+    fx, fy = cameras.focal_pixels(lens)
+    if isinstance(lens, Unified):
+        # It is an extended unified lens with β = 1, whose focal length counts in other units.
+        (xi,) = lens.coefficients
+        return EUCM, [fx / (1 + xi), fy / (1 + xi), *lens.center, xi / (1 + xi), 1.0]
+    parameters = [fx, fy, *lens.center, *lens.coefficients]
+    if isinstance(lens, BrownConrady):
+        is_short = not any(lens.coefficients[4:])
+        return (OPENCV, parameters[:8]) if is_short else (FULL_OPENCV, parameters)
+    return _CALIBRATED[type(lens)], parameters
+
+
+def misreading(lens: Lens) -> str | None:
+    """Return how readers of COLMAP models misread a lens's model, or None if they do not.
+
+    Source: examples/datasets/colmap.py of gsplat, dataset_colmap.py of 3DGRUT, and
+    colmap-reader/src/lib.rs and formats/colmap.rs of Brush.
+    """
+    (_, name), _ = camera(lens)
+    if name in _NOT_READ_BY:
+        return f"is COLMAP's {name}, which {_NOT_READ_BY[name]}; give them perspective views"
+    return cameras.misreading(lens)
 
 
 class Model:
@@ -159,7 +229,7 @@ class Model:
         seen_points: Sequence[Observations],
         visible: NDArray[np.intp],
     ) -> None:
-        self.lens = source.lens
+        self.cameras = heads.sensors(source)
         self.views = source.lightfield.views
         self.points = points.chosen(visible)
         number = np.zeros(len(points.positions), np.int64)
@@ -188,21 +258,71 @@ class Model:
             position = self.points.positions[index].tolist()
             yield index + 1, position, tuple(self.points.colours[index].tolist()), track
 
+    @cached_property
+    def camera_numbers(self) -> dict[str, int]:
+        """The number of each view's camera, from 1, by the view's name."""
+        numbered = enumerate(self.cameras, 1)
+        return {view.name: number for number, camera in numbered for view in camera.views}
+
+    @property
+    def has_rig(self) -> bool:
+        """Whether the cameras are a head."""
+        return self.cameras[0].mount is not None
+
+    def sensors(self) -> Iterator[tuple[int, Sequence[float]]]:
+        """Yield the number of each camera but the first, and its pose in the first one's axes."""
+        for number, first_from_camera in enumerate(heads.from_first(self.cameras)[1:], 2):
+            quaternion, translation = relative_pose(first_from_camera)
+            yield number, [*quaternion, *translation]
+
+    def frames(self) -> Iterator[tuple[int, Sequence[float], list[tuple[int, int]]]]:
+        """Yield the number of each place of the body, the first camera's pose, and its images.
+
+        An image is the number of its camera, and its own.
+        """
+        image_numbers = {view.name: number for number, view in enumerate(self.views, 1)}
+        for number, (first, *others) in enumerate(heads.places(self.cameras), 1):
+            images = [
+                (self.camera_numbers[view.name], image_numbers[view.name])
+                for view in (first, *others)
+            ]
+            quaternion, translation = pose(first.world_from_camera)
+            yield number, [*quaternion, *translation], images
+
     def write_binary(self, folder: Path) -> None:
-        (model, _), parameters = camera(self.lens)
-        size = (self.lens.width, self.lens.height)
-        _write(
-            folder / "cameras.bin",
-            [struct.pack(f"<QiiQQ{len(parameters)}d", 1, 1, model, *size, *parameters)],
-        )
+        _write(folder / "cameras.bin", self._binary_cameras())
         _write(folder / "images.bin", self._binary_images())
         _write(folder / "points3D.bin", self._binary_points())
+        if self.has_rig:
+            _write(folder / "rigs.bin", self._binary_rigs())
+            _write(folder / "frames.bin", self._binary_frames())
+
+    def _binary_cameras(self) -> Iterator[bytes]:
+        yield struct.pack("<Q", len(self.cameras))
+        for number, sensor in enumerate(self.cameras, 1):
+            (model, _), parameters = camera(sensor.lens)
+            size = (sensor.lens.width, sensor.lens.height)
+            yield struct.pack(f"<iiQQ{len(parameters)}d", number, model, *size, *parameters)
+
+    def _binary_rigs(self) -> Iterator[bytes]:
+        yield struct.pack("<QIIiI", 1, 1, len(self.cameras), _CAMERA_SENSOR, 1)
+        for number, sensor_from_rig in self.sensors():
+            yield struct.pack("<iIB7d", _CAMERA_SENSOR, number, True, *sensor_from_rig)
+
+    def _binary_frames(self) -> Iterator[bytes]:
+        frames = [*self.frames()]
+        yield struct.pack("<Q", len(frames))
+        for number, rig_from_world, images in frames:
+            yield struct.pack("<II7dI", number, 1, *rig_from_world, len(images))
+            for camera_number, image in images:
+                yield struct.pack("<iIQ", _CAMERA_SENSOR, camera_number, image)
 
     def _binary_images(self) -> Iterator[bytes]:
         yield struct.pack("<Q", len(self.views))
         for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
             quaternion, translation = pose(view.world_from_camera)
-            yield struct.pack("<i7di", number, *quaternion, *translation, 1)
+            camera_number = self.camera_numbers[view.name]
+            yield struct.pack("<i7di", number, *quaternion, *translation, camera_number)
             yield f"{view.name}.png".encode() + b"\0" + struct.pack("<Q", len(seen.indices))
             table = np.empty(len(seen.indices), [("pixel", "<f8", 2), ("point", "<i8")])
             table["pixel"] = seen.pixels
@@ -216,11 +336,29 @@ class Model:
             yield struct.pack(f"<{2 * len(track)}i", *(part for pair in track for part in pair))
 
     def write_text(self, folder: Path) -> None:
-        (_, model), parameters = camera(self.lens)
-        size = f"{self.lens.width} {self.lens.height}"
-        _write(folder / "cameras.txt", [f"1 {model} {size} {_text(parameters)}\n".encode()])
+        _write(folder / "cameras.txt", self._text_cameras())
         _write(folder / "images.txt", self._text_images())
         _write(folder / "points3D.txt", self._text_points())
+        if self.has_rig:
+            _write(folder / "rigs.txt", self._text_rigs())
+            _write(folder / "frames.txt", self._text_frames())
+
+    def _text_cameras(self) -> Iterator[bytes]:
+        for number, sensor in enumerate(self.cameras, 1):
+            (_, model), parameters = camera(sensor.lens)
+            size = f"{sensor.lens.width} {sensor.lens.height}"
+            yield f"{number} {model} {size} {_text(parameters)}\n".encode()
+
+    def _text_rigs(self) -> Iterator[bytes]:
+        yield f"1 {len(self.cameras)} CAMERA 1".encode()
+        for number, sensor_from_rig in self.sensors():
+            yield f" CAMERA {number} 1 {_text(sensor_from_rig)}".encode()
+        yield b"\n"
+
+    def _text_frames(self) -> Iterator[bytes]:
+        for number, rig_from_world, images in self.frames():
+            data = " ".join(f"CAMERA {camera_number} {image}" for camera_number, image in images)
+            yield f"{number} 1 {_text(rig_from_world)} {len(images)} {data}\n".encode()
 
     def _text_points(self) -> Iterator[bytes]:
         # Without a point the file would be empty.
@@ -232,7 +370,8 @@ class Model:
     def _text_images(self) -> Iterator[bytes]:
         for number, (view, seen) in enumerate(zip(self.views, self.seen, strict=True), 1):
             quaternion, translation = pose(view.world_from_camera)
-            yield f"{number} {_text(quaternion + translation)} 1 {view.name}.png\n".encode()
+            name = f"{self.camera_numbers[view.name]} {view.name}.png"
+            yield f"{number} {_text(quaternion + translation)} {name}\n".encode()
             points = zip(seen.pixels.tolist(), seen.indices.tolist(), strict=True)
             yield (" ".join(f"{x!r} {y!r} {index}" for (x, y), index in points) + "\n").encode()
 

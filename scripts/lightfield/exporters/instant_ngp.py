@@ -21,20 +21,30 @@ from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, model_validator
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import absolute_path, keep_apart, read_json, write_json
+from lightfield.core.files import (
+    absolute_path,
+    keep_apart,
+    link_or_copy,
+    read_json,
+    write_json,
+)
 from lightfield.core.names import PARTS, VIEWS
 from lightfield.core.progress import Progress
 from lightfield.engine.stage import ByHand, Stage, option, reads, writes
+from lightfield.export import cameras
 from lightfield.export.disparity import FARTHEST
 from lightfield.export.source import DepthMaps, Floats, SourceDataset
-from lightfield.exporters.base import NO_DEPTH, Export, ExportSettings
+from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ExportSettings, Joined
 from lightfield.formats.depth import check_size, depth_of
 from lightfield.formats.layout import Manifest
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, conventional_depth
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.fisheye624 import Fisheye624
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.lenses.thin_prism_fisheye import ThinPrismFisheye
 from lightfield.geometry.rigs import Rig
 from lightfield.geometry.rotations import euler_to_matrix, nearest_to_axes
 from lightfield.imaging import images
@@ -68,7 +78,7 @@ def pictures_of(path: Path) -> list[str]:
         raise UserError(f"{path}: is not JSON with frames, each with a file_path") from None
 
 
-class InstantNgp(Export):
+class InstantNgp(Joined):
     """The transforms.json of instant-ngp."""
 
     name = "instant_ngp"
@@ -122,6 +132,8 @@ class InstantNgp(Export):
         return self
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if reason := _asymmetry(lens):
+            return f"is a lens that instant-ngp cannot follow: {reason}; {TO_RECTILINEAR}"
         return NO_DEPTH if (self.depth or self.bounds == "depth") and not has_depth else None
 
     def rig_refusal(self, rig: Rig) -> str | None:
@@ -143,27 +155,35 @@ class InstantNgp(Export):
 
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write transforms.json into ``folder``, and the files that it names."""
-        images_folder = source.path(source.lightfield.views[0]).parent
-        places = _Places.of(folder / "transforms.json", images_folder)
+        view_images = {view.name: source.path(view) for view in source.lightfield.views}
+        places = _Places.of(folder / "transforms.json", view_images)
         _write(self, source.lightfield, source.suffix, places, source.training_list)
 
 
 @dataclass(frozen=True)
 class _Places:
-    """Where the files of an export lie: the transforms.json, and the folders of other files."""
+    """Where the files of an export lie: the transforms.json, images, and folders of other files.
+
+    - ``images``: the image of each view by the view's name. A view of another rig has a name that
+      its image does not have.
+    - ``copies``: the folder for copies of EXR views, and for links to the PNG views of other rigs.
+    """
 
     output: Path
-    images: Path
-    # Copies of EXR views.
-    exr: Path
+    images: Mapping[str, Path]
+    copies: Path
     depth: Path
 
     @classmethod
     def of(
-        cls, output: Path, images: Path, exr: Path | None = None, depth: Path | None = None
+        cls,
+        output: Path,
+        images: Mapping[str, Path],
+        copies: Path | None = None,
+        depth: Path | None = None,
     ) -> "_Places":
         folder = output.parent / "instant_ngp"
-        return cls(output, images, exr or folder, depth or folder / "depth")
+        return cls(output, images, copies or folder, depth or folder / "depth")
 
 
 def _write(
@@ -225,7 +245,8 @@ class _TransformsWriter:
         self.blind = _blind_pixels(self.lens)
         # The loader multiplies depth by the length of the ray. A perspective ray has length 1 along
         # the axis. All other rays have length 1. The loader ignores a depth of 0.
-        self.meaning = conventional_depth(self.lens)
+        # Rays of a pinhole, distorted or not, have length 1 along the axis in the loader.
+        self.meaning = "z" if _is_projected_to_plane(self.lens) else conventional_depth(self.lens)
 
     def placement(self) -> tuple[float, list[float]]:
         """Return scale and offset from the settings, or fit them to depth, or to the rig."""
@@ -242,7 +263,7 @@ class _TransformsWriter:
             return _fitted_to_rig(cameras, -self.lightfield.world_from_cameras[:, :3, 2])
         points = np.concatenate(list(self.seen_points()))
         if not len(points):
-            raise UserError(f"{self.places.images}: no view sees anything at a finite depth")
+            raise UserError(f"{self.lightfield.path}: no view sees anything at a finite depth")
         return fitted(*scene_bounds(cameras, points))
 
     def seen_points(self) -> Iterator[Floats]:
@@ -262,12 +283,14 @@ class _TransformsWriter:
         frames = {}
         missing = []
         for view in self.lightfield.views:
-            image = self.places.images / f"{view.name}{self.suffix}"
+            image = self.places.images[view.name]
             if self.suffix == ".exr":
-                image = self.copied_exr(image)
+                image = self.copied_exr(view, image)
             else:
                 if not image.is_file():
                     missing.append(image)
+                elif image.stem != view.name:
+                    image = self.linked(view, image)
                 self.write_mask(view, image)
             frame: dict[str, Any] = {
                 "file_path": self.relative(image),
@@ -309,10 +332,16 @@ class _TransformsWriter:
 
     def depth(self, view: View, meaning: str) -> Floats:
         """Return a view's depth (height, width) in metres. ``meaning`` is "z" or "distance"."""
-        path = self.places.images / f"{view.name}.exr"
+        path = self.places.images[view.name].with_suffix(".exr")
         return depth_of(path, self.lightfield, self.rays, meaning)
 
-    def copied_exr(self, source: Path) -> Path:
+    def linked(self, view: View, source: Path) -> Path:
+        """Link a PNG view of another rig, whose folder no package of this rig has."""
+        target = self.places.copies / f"{view.name}{source.suffix}"
+        link_or_copy(source, target)
+        return target
+
+    def copied_exr(self, view: View, source: Path) -> Path:
         """Copy R, G, B as half floats. Pixels that instant-ngp must not train on become −1.
 
         Transparent views keep their channel A. Their colour stays premultiplied by it.
@@ -324,7 +353,7 @@ class _TransformsWriter:
             raise UserError(f"{source}: has no channel {missing[0]}")
         check_size(source, self.lightfield, channels["R"])
         hidden = self.blind | np.isnan(channels.get("Z", np.zeros(1)))
-        target = self.places.exr / source.name
+        target = self.places.copies / f"{view.name}.exr"
         planes = np.moveaxis(image.colour, -1, 0)
         copied = {
             name: np.where(hidden, -1, plane).astype(np.float16)
@@ -368,8 +397,9 @@ def transform_matrix(view: View) -> Floats:
 def lens_keys(lens: Lens) -> dict[str, Any]:
     """Return the keys that describe a lens to the loader.
 
-    A fisheye is written as θ = Σ p_i r^i with r in pixels (``ftheta``), which is exact for
-    equidistant and polynomial lenses. A panorama is written as ``latlong``, because the loader's
+    A lens of Brown and Conrady is written as OpenCV's, unless it has k3 to k6. A fisheye is written
+    as θ = Σ p_i r^i with r in pixels (``ftheta``), which is exact for equidistant and polynomial
+    lenses. A panorama is written as ``latlong``, because the loader's
     ``equirectangular`` is linear in the sine of the latitude. Raises `UserError` if the loader
     would miss the lens by more than a quarter of a pixel.
     """
@@ -380,21 +410,53 @@ def lens_keys(lens: Lens) -> dict[str, Any]:
         "cy": lens.center[1],
     }
     if isinstance(lens, Rectilinear):
-        focal_x, focal_y = _axis_pixels(lens, 1.0)
-        return {
-            "camera_angle_x": 2 * math.atan(lens.width / (2 * focal_x)),
-            "camera_angle_y": 2 * math.atan(lens.height / (2 * focal_y)),
-            "fl_x": focal_x,
-            "fl_y": focal_y,
-            **keys,
-        }
+        return {**_focal_keys(lens, *_axis_pixels(lens, 1.0)), **keys}
+    if isinstance(lens, BrownConrady) and _is_projected_to_plane(lens):
+        named = cameras.distortion(lens)
+        coefficients = {name: named[name] for name in ("k1", "k2", "p1", "p2")}
+        return {**_focal_keys(lens, *cameras.focal_pixels(lens)), **keys, **coefficients}
     if _is_full_panorama(lens):
         focal = lens.width / (2 * math.pi)
         return {"fl_x": focal, "fl_y": focal, **keys, "latlong": True}
+    if reason := _asymmetry(lens):
+        raise UserError(_not_followed(reason))
     polynomial = _ftheta(lens)
     focal = 1 / abs(polynomial[1])
     coefficients = {f"ftheta_p{power}": value for power, value in enumerate(polynomial)}
     return {"fl_x": focal, "fl_y": focal, **keys, **coefficients}
+
+
+def _focal_keys(lens: Lens, focal_x: float, focal_y: float) -> dict[str, float]:
+    """Return the keys of a pinhole's focal lengths in pixels."""
+    return {
+        "camera_angle_x": 2 * math.atan(lens.width / (2 * focal_x)),
+        "camera_angle_y": 2 * math.atan(lens.height / (2 * focal_y)),
+        "fl_x": focal_x,
+        "fl_y": focal_y,
+    }
+
+
+def _has_more_than_opencv(lens: BrownConrady) -> bool:
+    """Return whether a lens has k3 to k6, which the loader's ``OpenCV`` lacks."""
+    return any(lens.coefficients[4:])
+
+
+def _asymmetry(lens: Lens) -> str | None:
+    """Return why the loader has no lens that is as asymmetric as this one. None if it has one."""
+    if isinstance(lens, ThinPrismFisheye | Fisheye624):
+        return "it has a thin prism"
+    if isinstance(lens, BrownConrady) and _has_more_than_opencv(lens):
+        named = cameras.distortion(lens)
+        if named["p1"] or named["p2"]:
+            return "it has p1 or p2 beside k3 to k6"
+    return None
+
+
+def _is_projected_to_plane(lens: Lens) -> bool:
+    """Return whether the loader takes the lens for a pinhole, distorted or not."""
+    if isinstance(lens, BrownConrady):
+        return not _has_more_than_opencv(lens)
+    return isinstance(lens, Rectilinear)
 
 
 def _blind_pixels(lens: Lens) -> NDArray[np.bool_]:
@@ -405,7 +467,7 @@ def _blind_pixels(lens: Lens) -> NDArray[np.bool_]:
     """
     rays = lens.pixel_rays()
     blind: NDArray[np.bool_] = np.isnan(rays).any(axis=-1)
-    if not isinstance(lens, Rectilinear) and not _is_full_panorama(lens):
+    if not _is_projected_to_plane(lens) and not _is_full_panorama(lens):
         blind |= ~(rays[..., 2] < -1e-6)
         y, x = np.ogrid[: lens.height, : lens.width]
         blind |= (x + 0.5 == lens.center[0]) & (y + 0.5 == lens.center[1])
@@ -627,12 +689,14 @@ def write_by_hand(job: TransformsByHand) -> None:
     training_list = Path(job.settings.trained_by) if job.settings.trained_by else None
     lightfield = LightField.read(job.input_cfg)
     lightfield.require_centre()
-    places = _Places.of(job.output, job.image_dir or lightfield.folder, job.exr_dir, job.depth_dir)
+    folder = job.image_dir or lightfield.folder
+    view_images = {view.name: folder / f"{view.name}{suffix}" for view in lightfield.views}
+    places = _Places.of(job.output, view_images, job.exr_dir, job.depth_dir)
     keep_apart("--output", job.output, job.input_cfg, training_list)
     if job.depth_dir and not options.depth:
         raise UserError("--depth-dir: needs options.depth: true in the settings file")
     if suffix == ".exr":
-        keep_apart("--exr-dir", places.exr, places.images)
+        keep_apart("--exr-dir", places.copies, folder)
     elif options.depth:
-        keep_apart("--depth-dir", places.depth, places.images)
+        keep_apart("--depth-dir", places.depth, folder)
     _write(options, lightfield, suffix, places, training_list)

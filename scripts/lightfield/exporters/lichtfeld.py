@@ -14,7 +14,6 @@ LichtFeld finds masks, depth and normals by the image's name without its suffix.
 Studio's transforms.cpp, blender_loader.cpp, filesystem_utils.hpp and image_exr.cpp.
 """
 
-import math
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -35,7 +34,7 @@ from lightfield.exporters.base import (
     TO_RECTILINEAR,
     ForTraining,
     PointCount,
-    angle,
+    sideways_refusal,
 )
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
@@ -84,8 +83,8 @@ class LichtFeld(ForTraining):
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant | KannalaBrandt):
-            if lens.fov >= math.pi:
-                return f"{angle(lens)}, but LichtFeld's ends below 180; give it a smaller fov"
+            if refusal := sideways_refusal(lens, "LichtFeld's"):
+                return refusal
             if isinstance(lens, KannalaBrandt) and lens.coefficients[3] != 0:
                 return "has a fourth coefficient, which LichtFeld drops; reproject to equidistant"
         elif isinstance(lens, Equirectangular):

@@ -3,8 +3,10 @@
 - ``views.json``: the sequence, and where its store is.
 - ``views.ncore4.zarr/``: the store.
   - ``cameras/camera/frames/<time>/``: a view as PNG, its name, and a mask if the view has pixels
-    that show nothing. There 0 means ignored.
-  - ``intrinsics``: f-theta for fisheyes, OpenCV's pinhole for perspective views.
+    that show nothing. There 0 means ignored. The cameras of a head have their own names, and frames
+    at the same times.
+  - ``intrinsics``: f-theta or OpenCV's fisheye for fisheyes, OpenCV's pinhole for perspective
+    views.
   - ``poses``: camera to world, with x right, y down and z forward, in metres.
   - ``lidars/points``: the points, as one frame of a lidar at the world's origin. All versions of
     gsplat's and 3DGRUT's readers take these. With other points, too, they stop.
@@ -28,12 +30,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from pydantic import Field
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
-from lightfield.export import cameras
+from lightfield.export import cameras, heads
 from lightfield.export.points import Points, lift
 from lightfield.export.source import SourceDataset
 from lightfield.export.zarr_store import ZarrStore
@@ -41,7 +44,10 @@ from lightfield.exporters.base import ForTraining, PointCount
 from lightfield.formats.lightfield import View
 from lightfield.geometry.exposure import Floats, pose_between, row_times
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.equidistant import Equidistant
+from lightfield.geometry.lenses.f_theta import FTheta
+from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
@@ -56,6 +62,10 @@ _DEFAULT = "default"
 STEP = 1_000_000
 # Microseconds of a moving camera's exposure.
 EXPOSURE = 500_000
+
+# NCore inverts r(θ) by so many steps. Rays may miss a lens by so many pixels.
+_NEWTON_STEPS = 3
+_MOST_MISS = 0.25
 
 # From Blender's camera (y up, looks along −z) to NCore's (y down, looks along z).
 _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -93,8 +103,34 @@ class _Frame:
         return cls(view, start, end, poses, (begin, begin + EXPOSURE))
 
 
-def _row_times(source: SourceDataset) -> tuple[float, float] | None:
-    """Return the times of the first and the last row of a rolling shutter. None without one.
+@dataclass(frozen=True)
+class _Stream:
+    """The frames of a camera. ``is_rolling`` says whether its rows have times of their own."""
+
+    name: str
+    lens: Lens
+    frames: Sequence[_Frame]
+    is_rolling: bool
+
+    @classmethod
+    def of(cls, source: SourceDataset, sensor: heads.Sensor, number: int) -> "_Stream":
+        """Return the stream of a source's camera. In a head, equal times are equal places."""
+        rows = _row_times(source, sensor.lens)
+        views = sorted(sensor.views, key=lambda view: view.name)
+        frames = [_Frame.of(view, index, rows) for index, view in enumerate(views)]
+        name = f"{CAMERA}{number or ''}"
+        if sensor.mount:
+            name = sensor.mount.name
+        if name in (_LIDAR, WORLD):
+            raise UserError(
+                f"{source.lightfield.path}: head: NCore has a {name} itself; give the camera "
+                "another name"
+            )
+        return cls(name, sensor.lens, frames, rows is not None)
+
+
+def _row_times(source: SourceDataset, lens: Lens) -> tuple[float, float] | None:
+    """Return the times of a lens's first and last row with a rolling shutter. None without one.
 
     Raises `UserError` if resampling mixed the rows.
     """
@@ -107,7 +143,7 @@ def _row_times(source: SourceDataset) -> tuple[float, float] | None:
             f"{source.lightfield.path}: reprojection: mixes the rows of a rolling shutter, and "
             "NCore needs their times; export the rendered views"
         )
-    times = row_times(source.lens.height, motion.rolling)
+    times = row_times(lens.height, motion.rolling)
     return float(times[0]), float(times[-1])
 
 
@@ -129,53 +165,66 @@ class NCore(ForTraining):
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if isinstance(lens, Equidistant | Rectilinear):
+        if isinstance(lens, KannalaBrandt | FTheta) and (miss := _miss(lens)) > _MOST_MISS:
+            return (
+                f"shows rays that NCore's inverse misses by {miss:.2g} pixels; give it a smaller "
+                "fov, or reproject to equidistant"
+            )
+        if isinstance(lens, Equidistant | Rectilinear | BrownConrady | KannalaBrandt | FTheta):
             return None
-        return "is not an equidistant fisheye or a pinhole; reproject to one of them"
+        return "has a lens that NCore lacks; reproject to rectilinear or equidistant"
+
+    def joins(self, lens: Lens, other: Lens) -> bool:
+        return True
 
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write a source's views into ``folder``."""
-        views = sorted(source.lightfield.views, key=lambda view: view.name)
-        if len(views) < 2:
+        source = heads.by_camera(source)
+        streams = [_Stream.of(source, sensor, n) for n, sensor in enumerate(heads.sensors(source))]
+        if len(streams[0].frames) < 2:
             raise UserError(
                 f"{source.lightfield.path}: frames: has one view; NCore needs two or more"
             )
-        rows = _row_times(source)
-        frames = [_Frame.of(view, index, rows) for index, view in enumerate(views)]
+        end = max(max(stream.frames[-1].poses) for stream in streams)
         sequence = {
             "sequence_id": SEQUENCE,
             # The end is not included.
-            "sequence_timestamp_interval_us": {"start": 0, "stop": max(frames[-1].poses) + 1},
+            "sequence_timestamp_interval_us": {"start": 0, "stop": end + 1},
             "generic_meta_data": {},
             "version": "v4",
         }
         name = f"{SEQUENCE}.ncore4.zarr"
         store = ZarrStore(folder / name, sequence | {"component_group_name": ""})
         components = {
-            "cameras": CAMERA,
-            "cuboids": _DEFAULT,
-            "intrinsics": _DEFAULT,
-            "lidars": _LIDAR,
-            "masks": _DEFAULT,
-            "poses": _DEFAULT,
+            "cameras": [stream.name for stream in streams],
+            "cuboids": [_DEFAULT],
+            "intrinsics": [_DEFAULT],
+            "lidars": [_LIDAR],
+            "masks": [_DEFAULT],
+            "poses": [_DEFAULT],
         }
-        for component, instance in components.items():
+        for component, instances in components.items():
             store.group(component)
-            names = {
-                "component_name": component,
-                "component_instance_name": instance,
-                "component_version": "v1",
-            }
-            store.group(f"{component}/{instance}", names | {"generic_meta_data": {}})
+            for instance in instances:
+                names = {
+                    "component_name": component,
+                    "component_instance_name": instance,
+                    "component_version": "v1",
+                }
+                store.group(f"{component}/{instance}", names | {"generic_meta_data": {}})
         store.group("cuboids/default/cuboids", {"cuboid_track_observations": []})
-        _write_poses(store, frames)
-        _write_lens(store, camera(source.lens, is_rolling=rows is not None))
+        _write_poses(store, streams)
+        _write_lenses(store, streams)
         _write_points(store, lift(source, count=self.points))
-        _write_frames(store, source, frames)
+        progress = Progress(len(source.lightfield.views), "ncore", "views")
+        for stream in streams:
+            _write_frames(store, source, stream, progress)
         digest = store.close()
         versions = {
-            component: {instance: {"version": "v1", "generic_meta_data": {}}}
-            for component, instance in components.items()
+            component: {
+                instance: {"version": "v1", "generic_meta_data": {}} for instance in instances
+            }
+            for component, instances in components.items()
         }
         stores = [{"path": name, "md5": digest, "components": versions}]
         write_json(folder / f"{SEQUENCE}.json", sequence | {"component_stores": stores})
@@ -189,12 +238,17 @@ def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
         "external_distortion_parameters": None,
     }
     parameters: dict[str, Any]
-    if isinstance(lens, Rectilinear):
+    if isinstance(lens, Rectilinear | BrownConrady):
+        radial, tangential = [0.0] * 6, [0.0] * 2
+        if isinstance(lens, BrownConrady):
+            named = cameras.distortion(lens)
+            radial = [named[f"k{number}"] for number in range(1, 7)]
+            tangential = [named["p1"], named["p2"]]
         parameters = {
             "principal_point": list(lens.center),
             "focal_length": list(cameras.focal_pixels(lens)),
-            "radial_coeffs": [0.0] * 6,
-            "tangential_coeffs": [0.0] * 2,
+            "radial_coeffs": radial,
+            "tangential_coeffs": tangential,
             "thin_prism_coeffs": [0.0] * 4,
         }
         # gsplat does not know NCore's "ideal-pinhole".
@@ -202,6 +256,20 @@ def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
             "camera_model_type": "opencv-pinhole",
             "camera_model_parameters": common | parameters,
         }
+    if isinstance(lens, KannalaBrandt):
+        parameters = {
+            "principal_point": list(lens.center),
+            "focal_length": list(cameras.focal_pixels(lens)),
+            "radial_coeffs": list(lens.coefficients),
+            "max_angle": cameras.largest_angle(lens),
+        }
+        return {
+            "camera_model_type": "opencv-fisheye",
+            "camera_model_parameters": common | parameters,
+        }
+    if isinstance(lens, FTheta):
+        parameters = _ftheta(lens)
+        return {"camera_model_type": "ftheta", "camera_model_parameters": common | parameters}
     if not isinstance(lens, Equidistant):
         raise TypeError(f"{type(lens).__name__} is not a lens of this export")
     pixels_a_radian = lens.height / lens.fov
@@ -218,25 +286,82 @@ def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
     return {"camera_model_type": "ftheta", "camera_model_parameters": common | parameters}
 
 
-def _write_poses(store: ZarrStore, frames: Sequence[_Frame]) -> None:
+def _polynomials(lens: KannalaBrandt | FTheta) -> tuple[Polynomial, Polynomial]:
+    """Return r(θ) in focal lengths, and the θ(r) from which NCore starts Newton's method.
+
+    For OpenCV's fisheye, NCore's start is proportional to r.
+    """
+    largest = cameras.largest_angle(lens)
+    if isinstance(lens, KannalaBrandt):
+        k1, k2, k3, k4 = lens.coefficients
+        fx, fy = cameras.focal_pixels(lens)
+        side = max(lens.width / 2 / fx, lens.height / 2 / fy)
+        return Polynomial([0, 1, 0, k1, 0, k2, 0, k3, 0, k4]), Polynomial([0, largest / side])
+    forward = Polynomial([0, 1, *lens.coefficients])
+    angles = np.linspace(0, largest, 257)[1:]
+    radii = forward(angles)
+    # Without a constant: the axis is at r = 0. The powers of r / r_max are of one size.
+    powers = (radii[:, None] / radii[-1]) ** np.arange(1, 6)
+    fitted, *_ = np.linalg.lstsq(powers, angles, rcond=None)
+    return forward, Polynomial([0, *(fitted / radii[-1] ** np.arange(1, 6))])
+
+
+def _miss(lens: KannalaBrandt | FTheta) -> float:
+    """Return by how many pixels NCore's three steps of Newton's method miss the lens at most."""
+    forward, start = _polynomials(lens)
+    angles = np.linspace(0, cameras.largest_angle(lens), 257)
+    radii = forward(angles)
+    found = start(radii)
+    slope = forward.deriv()
+    with np.errstate(all="ignore"):
+        for _ in range(_NEWTON_STEPS):
+            found = found - (forward(found) - radii) / slope(found)
+        errors = np.abs(found - angles) * max(cameras.focal_pixels(lens))
+    return float(np.max(np.nan_to_num(errors, nan=np.inf)))
+
+
+def _ftheta(lens: FTheta) -> dict[str, Any]:
+    """Return NCore's parameters of an f-theta lens, whose polynomial is NCore's reference."""
+    fx, fy = cameras.focal_pixels(lens)
+    forward, start = _polynomials(lens)
+    return {
+        "principal_point": [lens.center[0] - 0.5, lens.center[1] - 0.5],
+        "reference_poly": "ANGLE_TO_PIXELDIST",
+        # Both have six coefficients, and r in pixels.
+        "pixeldist_to_angle_poly": [k / fy**power for power, k in enumerate(start.coef.tolist())],
+        "angle_to_pixeldist_poly": [fy * k for k in forward.coef.tolist()],
+        "max_angle": cameras.largest_angle(lens),
+        "linear_cde": [fx / fy, 0.0, 0.0],
+    }
+
+
+def _write_poses(store: ZarrStore, streams: Sequence[_Stream]) -> None:
+    lidar = {"pose": np.eye(4).tolist(), "dtype": "float64"}
+    store.group("poses/default/static_poses", {str((_LIDAR, WORLD)): lidar})
+    poses = {str((stream.name, WORLD)): _poses(stream.frames) for stream in streams}
+    store.group("poses/default/dynamic_poses", poses)
+
+
+def _poses(frames: Sequence[_Frame]) -> dict[str, Any]:
+    """Return the poses of a camera by their times."""
     matrices = [matrix for frame in frames for matrix in frame.poses.values()]
-    poses = {
+    return {
         "poses": [(matrix @ _FLIP).tolist() for matrix in matrices],
         "timestamps_us": [time for frame in frames for time in frame.poses],
         "dtype": "float64",
     }
-    lidar = {"pose": np.eye(4).tolist(), "dtype": "float64"}
-    store.group("poses/default/static_poses", {str((_LIDAR, WORLD)): lidar})
-    store.group("poses/default/dynamic_poses", {str((CAMERA, WORLD)): poses})
 
 
-def _write_lens(store: ZarrStore, intrinsics: dict[str, Any]) -> None:
+def _write_lenses(store: ZarrStore, streams: Sequence[_Stream]) -> None:
     store.group("intrinsics/default/cameras")
-    store.group(f"intrinsics/default/cameras/{CAMERA}", intrinsics)
+    for stream in streams:
+        intrinsics = camera(stream.lens, stream.is_rolling)
+        store.group(f"intrinsics/default/cameras/{stream.name}", intrinsics)
     store.group("intrinsics/default/lidars")
     # These are masks for all frames. Each frame has its own.
     store.group("masks/default/cameras")
-    store.group(f"masks/default/cameras/{CAMERA}", {"mask_names": []})
+    for stream in streams:
+        store.group(f"masks/default/cameras/{stream.name}", {"mask_names": []})
 
 
 def _write_points(store: ZarrStore, points: Points) -> None:
@@ -264,12 +389,13 @@ def _write_points(store: ZarrStore, points: Points) -> None:
     store.array(f"{frame}/ray_bundle_returns_valid_mask_packed", is_valid, sizes)
 
 
-def _write_frames(store: ZarrStore, source: SourceDataset, frames: Sequence[_Frame]) -> None:
-    folder = f"cameras/{CAMERA}/frames"
-    times = [[frame.start, frame.end] for frame in frames]
+def _write_frames(
+    store: ZarrStore, source: SourceDataset, stream: _Stream, progress: Progress
+) -> None:
+    folder = f"cameras/{stream.name}/frames"
+    times = [[frame.start, frame.end] for frame in stream.frames]
     store.group(folder, {"frames_timestamps_us": times})
-    progress = Progress(len(frames), "ncore", "views")
-    for frame in frames:
+    for frame in stream.frames:
         view = frame.view
         place = f"{folder}/{frame.end}"
         store.group(place)
@@ -281,7 +407,7 @@ def _write_frames(store: ZarrStore, source: SourceDataset, frames: Sequence[_Fra
         if not valid.all():
             store.array(f"{place}/generic_data/mask", valid.astype(np.uint8) * 255)
         # gsplat takes three channels.
-        picture = store.folder / f"{view.name}.png"
+        picture = store.folder / f"{view.name.replace('/', '_')}.png"
         images.write_png(picture, source.opaque(view))
         store.encoded(f"{place}/image", picture, {"format": "png"})
         progress.done()

@@ -1,7 +1,7 @@
 """Writes a nerfstudio dataset: perspective views, fisheyes past 180° too, and full panoramas.
 
 - ``transforms.json``: camera-to-world matrices as in lightfield.json (OpenGL axes, Z up), and a
-  list of files for each part.
+  list of files for each part. Each frame has its own intrinsics if there are several lenses.
 - ``images/``: the views.
 - ``masks/``: 0 means ignored. Either all frames have a mask, or none.
 - ``depths/``: 16-bit millimetres, if the settings ask for them. Z for perspective views. Distance
@@ -14,6 +14,7 @@ and refuses panoramas. Sources: nerfstudio's nerfstudio_dataparser.py and camera
 and formats/nerfstudio.rs of Brush 1.0.
 """
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -21,20 +22,38 @@ import numpy as np
 from pydantic import Field
 
 from lightfield.core.files import write_json
-from lightfield.export import cameras
+from lightfield.export import cameras, heads
 from lightfield.export.pictures import write_pictures
 from lightfield.export.points import lift, write_ply
 from lightfield.export.source import DepthMaps, SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, ForTraining, PointCount
+from lightfield.exporters.base import (
+    NO_DEPTH,
+    TO_RECTILINEAR,
+    ForTraining,
+    PointCount,
+    sideways_refusal,
+)
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.brown_conrady import BrownConrady
+from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
+from lightfield.geometry.lenses.fisheye624 import Fisheye624
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 
 POINT_CLOUD = "points.ply"
+_MODELS: dict[type[Lens], str] = {
+    # nerfstudio takes OPENCV without distortion for PINHOLE, which Brush does not read.
+    Rectilinear: "OPENCV",
+    BrownConrady: "OPENCV",
+    Equidistant: "OPENCV_FISHEYE",
+    KannalaBrandt: "OPENCV_FISHEYE",
+    Fisheye624: "FISHEYE624",
+    Equirectangular: "EQUIRECTANGULAR",
+}
 # In metres.
 _DEPTH_UNIT = 0.001
 
@@ -60,23 +79,48 @@ class Nerfstudio(ForTraining):
     )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
-        if self.splatfacto and not isinstance(lens, Rectilinear):
+        # splatfacto undistorts OPENCV.
+        if self.splatfacto and not isinstance(lens, Rectilinear | BrownConrady):
             return f"would be taken for a pinhole by splatfacto; {TO_RECTILINEAR}"
-        if isinstance(lens, Equidistant | KannalaBrandt):
+        if isinstance(lens, BrownConrady):
+            if cameras.has_denominator(lens):
+                return f"has k4 to k6, which nerfstudio lacks; {TO_RECTILINEAR}"
+        elif isinstance(lens, Fisheye624):
+            if refusal := sideways_refusal(lens, "nerfstudio's FISHEYE624"):
+                return refusal
+        elif isinstance(lens, Equidistant | KannalaBrandt):
             has_pixel_on_axis = lens.center[0] % 1 == 0.5 and lens.center[1] % 1 == 0.5
             if has_pixel_on_axis:
                 return "has a pixel on its optical axis, which is NaN to nerfstudio; use even sizes"
         elif isinstance(lens, Equirectangular):
             if not lens.is_full:
                 return f"is a part of a panorama; nerfstudio takes whole ones; {TO_RECTILINEAR}"
-        elif not isinstance(lens, Rectilinear):
+        elif type(lens) not in _MODELS:
             return f"has a lens that nerfstudio lacks; {TO_RECTILINEAR}, equidistant or a panorama"
         return NO_DEPTH if self.depth and not has_depth else None
 
+    def joins(self, lens: Lens, other: Lens) -> bool:
+        if lens == other:
+            return True
+        # nerfstudio has one camera model for all frames, which have their own parameters. But it
+        # computes all rays of FISHEYE624 with the parameters of one of them.
+        model = _MODELS.get(type(lens))
+        return model == _MODELS.get(type(other)) and model != "FISHEYE624"
+
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write a source's views into ``folder``."""
+        source = heads.by_camera(source)
         views = source.lightfield.views
-        meaning = conventional_depth(source.lens)
+        # These rays have length 1 along the axis.
+        has_z_rays = isinstance(source.lens, BrownConrady | Fisheye624)
+        meaning = "z" if has_z_rays else conventional_depth(source.lens)
+        if any(isinstance(lens, BrownConrady) and lens.coefficients[4] for lens in source.lenses):
+            print(
+                f"warning: {source.lightfield.path}: camera: has k3, which Brush leaves out; give "
+                "Brush the export colmap",
+                file=sys.stderr,
+            )
+        has_lenses = len(source.lenses) > 1
         masked = any(not source.valid(view).all() for view in views)
         frames = []
         depth_maps = DepthMaps(_DEPTH_UNIT)
@@ -93,6 +137,8 @@ class Nerfstudio(ForTraining):
                 "file_path": f"images/{name}",
                 "transform_matrix": view.world_from_camera.tolist(),
             }
+            if has_lenses:
+                frame |= _parameters(source.view(view).lens)
             if masked:
                 frame["mask_path"] = f"masks/{name}"
             if self.depth:
@@ -104,8 +150,11 @@ class Nerfstudio(ForTraining):
         write_ply(folder / POINT_CLOUD, lift(source, count=self.points))
         paths = {view.name: frame["file_path"] for view, frame in zip(views, frames, strict=True)}
         lists = {"train": parts.train, "val": parts.validation, "test": parts.test}
+        intrinsics = camera(source.lens)
+        if has_lenses:
+            intrinsics = {"camera_model": intrinsics["camera_model"]}
         content = {
-            **camera(source.lens),
+            **intrinsics,
             "applied_transform": np.eye(4)[:3].tolist(),
             "ply_file_path": POINT_CLOUD,
         }
@@ -117,20 +166,33 @@ class Nerfstudio(ForTraining):
 
 def camera(lens: Lens) -> dict[str, Any]:
     """Return the keys that describe a lens to nerfstudio."""
+    model = {"camera_model": _MODELS[type(lens)]}
     size = {"w": lens.width, "h": lens.height}
     if isinstance(lens, Equirectangular):
         focal = {"fl_x": lens.width / 2, "fl_y": float(lens.height)}
-        return {"camera_model": "EQUIRECTANGULAR", **focal, **_center(lens), **size}
-    if isinstance(lens, Rectilinear):
-        fx, fy = cameras.focal_pixels(lens)
-        # nerfstudio takes OPENCV without distortion for PINHOLE, which Brush does not read.
-        undistorted = dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
-        focal = {"fl_x": fx, "fl_y": fy}
-        return {"camera_model": "OPENCV", **focal, **_center(lens), **size, **undistorted}
-    fx, fy, *distortion = cameras.opencv_fisheye(lens)
-    named = {f"k{number}": value for number, value in enumerate(distortion, 1)}
+        return {**model, **focal, **_center(lens), **size}
+    assert isinstance(lens, Rectilinear | CalibratedLens | Equidistant)
+    fx, fy = cameras.focal_pixels(lens)
     focal = {"fl_x": fx, "fl_y": fy}
-    return {"camera_model": "OPENCV_FISHEYE", **focal, **_center(lens), **size, **named}
+    return {**model, **focal, **_center(lens), **size, **_distortion(lens)}
+
+
+def _distortion(lens: Lens) -> dict[str, Any]:
+    """Return the keys of a lens's distortion."""
+    if isinstance(lens, Rectilinear):
+        return dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)
+    if isinstance(lens, BrownConrady):
+        named = cameras.distortion(lens)
+        return {name: named[name] for name in ("k1", "k2", "k3", "p1", "p2")}
+    if isinstance(lens, Fisheye624):
+        return {"distortion_params": list(lens.coefficients)}
+    _, _, *radial = cameras.opencv_fisheye(lens)
+    return {f"k{number}": value for number, value in enumerate(radial, 1)}
+
+
+def _parameters(lens: Lens) -> dict[str, Any]:
+    """Return the keys that describe a lens of a known model."""
+    return {key: value for key, value in camera(lens).items() if key != "camera_model"}
 
 
 def _center(lens: Lens) -> dict[str, float]:

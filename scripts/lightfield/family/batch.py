@@ -28,7 +28,7 @@ from lightfield.configuration.family import RECORD, Member
 from lightfield.core import cli, leftovers
 from lightfield.core.errors import UserError
 from lightfield.core.files import append_json_line
-from lightfield.core.names import SPLITS
+from lightfield.core.names import HEADS, SPLITS
 from lightfield.core.progress import Progress
 from lightfield.engine import receipts
 from lightfield.engine.receipts import PART_SUFFIX, OpenReceipt
@@ -53,7 +53,7 @@ _CRASHES = (
 # A member at which processes were killed in so many runs in a row has failed.
 _MOST_DEATHS = 3
 # The files that stand for a member in the receipt of its batch.
-_OF_MEMBER = (RECORD, SPLITS, SUMS)
+_OF_MEMBER = (RECORD, SPLITS, HEADS, SUMS)
 
 
 def run(job: BuildMembers) -> None:

@@ -10,6 +10,9 @@ from lightfield.formats.layout import Manifest
 # The list of an export's files, which is written last.
 MANIFEST = "export.json"
 
+# The option of an export.json that lists the sizes of its pictures, if there are several.
+SIZES = "sizes"
+
 # The folder of a dataset that holds its exports.
 FOLDER = "exports"
 
@@ -24,7 +27,11 @@ def files_of(path: Path) -> dict[str, str]:
 
 
 def _pictures(path: Path) -> list[str]:
-    return [name for name in files_of(path) if name.endswith(".png")]
+    """Return the pictures that have the size of the views: none if there are several sizes."""
+    pictures = [name for name in files_of(path) if name.endswith(".png")]
+    options = read_json(path).get("options")
+    has_sizes = isinstance(options, dict) and SIZES in options
+    return [] if has_sizes else pictures
 
 
 # The exports with a folder of their own. Exports of a sequence are in the rig's folder.

@@ -11,9 +11,9 @@ from functools import cached_property
 from pathlib import Path
 
 from lightfield.core.files import read_bytes, write_text
-from lightfield.core.names import READER
+from lightfield.core.names import IMU, READER
 from lightfield.core.paths import inside
-from lightfield.formats.lightfield import NAME, LightField
+from lightfield.formats.lightfield import NAME, OMNIDIRECTIONAL, LightField
 from lightfield.formats.passes import FLOW, NAMES, Pass
 from lightfield.formats.sensors import SensorSettings, parameter_file, settings_in
 
@@ -25,6 +25,9 @@ FRAME_FOLDERS = "f[0-9]*"
 
 OTHER_FILES = "other_files.tar"
 """The tar beside published shards that has the files of no single view."""
+
+CORNERS = "corners.json"
+"""The corners of the calibration boards in each view, if the scene has boards."""
 
 SUMS = "sha256sums.txt"
 """The file with a dataset's checksums. Only a valid dataset has it."""
@@ -41,6 +44,9 @@ CARD = "card.json"
 WALK = "walk.html"
 PACKAGED = (README, CARD, READER, WALK)
 """The files that a package adds to a dataset."""
+
+IMU_FILES = (f"{IMU}/imu.csv", f"{IMU}/groundtruth.csv", f"{IMU}/views.csv")
+"""The files of an inertial sensor: what it measures, the true motion, and the views' times."""
 
 DEPTH_PICTURE = "{view}_depth.png"
 """The picture that scripts/reproject.py puts beside a view with --depth-png."""
@@ -227,15 +233,25 @@ def expected_pass_files(sets: Sequence[ImageSet]) -> list[File]:
     return files
 
 
-def json_files(sets: Sequence[ImageSet]) -> list[str]:
-    """Return the paths of the JSON files beside images: names of ids, and sensors' parameters."""
+def side_files(sets: Sequence[ImageSet]) -> list[str]:
+    """Return the paths of the files beside images: corners, names, parameters, inertial sensors."""
     rendered_set = rendered(sets)
     passes = rendered_set.lightfield.passes if rendered_set else []
     paths = [f"{view_pass.name}/{NAMES}" for view_pass in passes if view_pass.kind == "id"]
+    if rendered_set and has_corners(rendered_set.lightfield):
+        paths.append(CORNERS)
+    if rendered_set and IMU in rendered_set.lightfield.content:
+        paths += IMU_FILES
     for image_set in sets:
         if image_set.sensor:
             paths += [f"{image_set.folder}/{parameter_file(view)}" for view in image_set.views]
     return paths
+
+
+def has_corners(lightfield: LightField) -> bool:
+    """Return whether a dataset has corners of calibration boards."""
+    has_boards = bool(lightfield.content.get("scene", {}).get("targets"))
+    return has_boards and OMNIDIRECTIONAL not in lightfield.content
 
 
 def read_sums(path: Path) -> dict[str, str]:

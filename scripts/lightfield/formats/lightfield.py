@@ -7,8 +7,10 @@ SILVR's tools wrote have these alone, and are read, too. Ours are:
 - ``frame``: the frame of the scene that was rendered.
 - ``scene`` and ``render``: what was rendered, and how.
 - ``machine``: the properties of the machine that change last digits.
+- ``head``: the head that the camera belongs to, and where it sits on the head's body.
 - ``passes``: which of the passes in ``render`` a reprojection has.
 - ``split`` of a frame: what the view is for.
+- ``imu``: the inertial sensor whose files lie beside it.
 - ``flow`` of a frame: the view to which its flow leads.
 - ``exposure`` of a frame: the camera-to-world matrices at the ``start`` and the ``end`` of the
   exposure of a moving camera. ``world_matrix`` is the matrix in its middle.
@@ -49,6 +51,8 @@ EXPOSURE = "exposure"
 MACHINE = "machine"
 # The size and center of a rig that fits the scene's box, in metres.
 RIG_FIT = "rig_fit"
+# The head that the camera belongs to, and its pose there.
+HEAD = "head"
 # How a model came into the unit box: its shift in metres, and then its scale.
 MODEL_PLACEMENT = "model_placement"
 
@@ -127,6 +131,31 @@ class View:
         }
 
 
+@dataclass(frozen=True, eq=False)
+class HeadCamera:
+    """One of the cameras of a head, which have fixed poses on one body.
+
+    - ``head``: the head's name.
+    - ``name``: the camera's name.
+    - ``body_from_camera``: the matrix (4, 4) from the camera's axes to the body's, in metres.
+    """
+
+    head: str
+    name: str
+    body_from_camera: Floats
+
+    def body_of(self, world_from_camera: Floats) -> Floats:
+        """Return the body's pose (4, 4) in the world, from the camera's."""
+        return np.asarray(world_from_camera @ np.linalg.inv(self.body_from_camera))
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "name": self.head,
+            "camera": self.name,
+            "body_from_camera": self.body_from_camera.tolist(),
+        }
+
+
 @dataclass(eq=False)
 class LightField:
     """A lightfield.json.
@@ -187,6 +216,8 @@ class LightField:
             "sensor_size": intrinsics["sensor_size"],
             **keys,
         }
+        if mount := rig.mount:
+            content[HEAD] = HeadCamera(mount.head, mount.name, mount.body_from_camera).to_json()
         views = [
             View(
                 pose.name,
@@ -257,14 +288,39 @@ class LightField:
         """Return a copy whose views have the poses at the start and the end of their exposures."""
         motion = self.render.camera_motion
         assert motion
+        # The cameras of a head move with its body.
+        body_from_camera = self.head.body_from_camera if self.head else np.eye(4)
+        camera_from_body = np.linalg.inv(body_from_camera)
         views = []
         for view in self.views:
+            world_from_body = view.world_from_camera @ camera_from_body
             world_from_cameras = {}
             for name, time in (("start", -0.5), ("end", 0.5)):
-                pose = pose_at(view.world_from_camera, motion.travel, motion.turn, time)
+                pose = pose_at(world_from_body, motion.travel, motion.turn, time)
+                pose = pose @ body_from_camera
                 world_from_cameras[name] = (np.round(pose, 12) + 0.0).tolist()
             views.append(replace(view, others={**view.others, EXPOSURE: world_from_cameras}))
         return self.changed(views=views)
+
+    @cached_property
+    def head(self) -> HeadCamera | None:
+        """The camera's place in its head. None without a head, and for faces of a cube map.
+
+        Raises `UserError` for a wrong entry.
+        """
+        if HEAD not in self.content:
+            return None
+        try:
+            content = self.content[HEAD]
+            if "body_from_camera" not in content:
+                return None
+            matrix = np.array(content["body_from_camera"], np.float64).reshape(4, 4)
+            return HeadCamera(str(content["name"]), str(content["camera"]), matrix)
+        except (LookupError, TypeError, ValueError):
+            raise UserError(
+                f"{self.path}: {HEAD}: must have name, camera and body_from_camera, a matrix of "
+                "4 × 4 numbers"
+            ) from None
 
     @property
     def folder(self) -> Path:

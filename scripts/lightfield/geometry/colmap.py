@@ -21,6 +21,17 @@ def pose(world_from_camera: Floats) -> tuple[list[float], list[float]]:
     return [w, x, y, z], (-turn @ world_from_camera[:3, 3]).tolist()
 
 
+def relative_pose(first_from_other: Floats) -> tuple[list[float], list[float]]:
+    """Return the pose, from one camera to another, of a matrix (4, 4) from the other to the one.
+
+    The matrix is between our axes. The quaternion (w, x, y, z) and the translation are between
+    COLMAP's.
+    """
+    first = np.eye(4)
+    first[:3, :3] = _FLIP
+    return pose(first @ first_from_other)
+
+
 def world_from_camera(quaternion: Floats, translation: Floats) -> Floats:
     """Return the camera-to-world matrix (4, 4) of a unit quaternion (w, x, y, z) and (3,)."""
     turn = quaternion_to_matrix(quaternion)

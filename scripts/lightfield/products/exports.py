@@ -17,7 +17,7 @@ from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import SourceDataset
 from lightfield.exporters import list_path
 from lightfield.exporters.base import Developed, Export, ExportSettings
-from lightfield.formats.export_lists import MANIFEST, files_of
+from lightfield.formats.export_lists import MANIFEST, SIZES, files_of
 from lightfield.formats.layout import FRAME_FOLDERS
 from lightfield.formats.lightfield import NAME
 from lightfield.stages.exports import ExportViews
@@ -38,17 +38,22 @@ def run(source: Source, options: Export, folder: Path) -> None:
     Replaces an earlier export in a folder of its own, and leaves no files there if it fails. Raises
     `UserError` if such a folder holds other files, or if the consumer cannot take these views.
     """
-    reason = options.refusal(source.lens, source.has_depth)
-    if reason:
-        raise UserError(f"{source.lightfield.path}: {reason}")
+    for lens, path in source.lenses.items():
+        if not options.joins(source.lens, lens):
+            raise UserError(f"{path}: camera: must be the same as in {source.lightfield.path}")
+        if reason := options.refusal(lens, source.has_depth):
+            raise UserError(f"{path}: {reason}")
     if options.lists_beside_views:
         options.export(source, folder)
         return
-    look = {"look": source.look.to_json()} if source.look else {}
+    facts: dict[str, Any] = {"look": source.look.to_json()} if source.look else {}
+    sizes = {(lens.width, lens.height) for lens in source.lenses}
+    if len(sizes) > 1:
+        facts[SIZES] = sorted(sizes)
     place = source.dataset / source.name / list_path(options.name)
     replace_folder(
         options.name,
-        {**options.recorded, **look},
+        {**options.recorded, **facts},
         folder,
         lambda target: options.export(source, target),
         is_own=folder.resolve() == place.parent.resolve(),

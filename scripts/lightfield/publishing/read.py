@@ -14,6 +14,7 @@ import json
 import re
 import tarfile
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,33 @@ def open_views(reprojection: str = "", folder: Any = Path(__file__).parent) -> "
     if not views:
         raise ValueError(f"{folder}: has no views {reprojection!r}; it has {sorted(names)}")
     return [views[place] for place in sorted(views)]
+
+
+sin, cos, tan = np.sin, np.cos, np.tan
+# The lenses of calibrated cameras: r in focal lengths, at an angle t from the axis. k are the
+# coefficients.
+CALIBRATED: Any = {
+    "kannala_brandt": lambda k, t: ratio([1, *k], [1], t),
+    "f_theta": lambda k, t: t * np.polynomial.Polynomial([1, *k])(t),
+    "division": lambda k, t: 2 * sin(t) / (cos(t) + (cos(t) ** 2 - 4 * k[0] * sin(t) ** 2) ** 0.5),
+    "fov_model": lambda k, t: np.arctan(2 * tan(k[0] / 2) * tan(t)) / k[0],
+    "unified": lambda k, t: sin(t) / (cos(t) + k[0]),
+    "extended_unified": lambda k, t: sin(t) / mixed(k[0], k[1] ** 0.5 * sin(t), cos(t)),
+    "double_sphere": lambda k, t: sin(t) / mixed(k[1], sin(t), k[0] + cos(t)),
+    "brown_conrady": lambda k, t: ratio([1, *k[:2], k[4]], [1, *k[5:]], tan(t)),
+    "thin_prism_fisheye": lambda k, t: ratio([1, *k[:2], *k[4:6]], [1], t),
+    "fisheye624": lambda k, t: ratio([1, *k[:6]], [1], t),
+}
+# What bends a lens whose radial part is r: the radius in the plane of the bend at an angle, and r
+# at that radius. Then its tangential, prism and growing prism coefficients, as up + i right.
+BENT: Any = {
+    "brown_conrady": lambda k, r: (tan, lambda t: r(np.arctan(t)), 1j * k[3] - k[2], 0, 0),
+    "thin_prism_fisheye": lambda k, r: (np.abs, r, 1j * k[3] - k[2], 1j * k[6] - k[7], 0),
+    "fisheye624": lambda k, r: (
+        *(r, np.abs),
+        *(1j * k[6] - k[7], 1j * k[8] - k[10], 1j * k[9] - k[11]),
+    ),
+}
 
 
 class PlainView:
@@ -113,26 +141,30 @@ class PlainLens:
         self.center = camera.get("principal_point", self.size / 2)
         pixel = content["sensor_size"] / self.size  # mm
         length = camera.get("focal_length", camera.get("fisheye_lens"))
+        self.bend: Any = None
         self.unit = pixel / length if length else 2 / self.size  # The image circle has radius 1.
         # The largest angle θ from the axis. Then θ of r = |(u, v)|, and r of θ, for each lens.
         self.end = end = min(camera.get("fisheye_fov", np.pi) / 2, np.pi)
-        sin, tan = np.sin(end), np.tan(end / 2)
+        side, half = sin(end), tan(end / 2)
         curves: Any = {
             "EQUIRECTANGULAR": (None, None),
-            "PERSP": (np.arctan, np.tan),
+            "PERSP": (np.arctan, tan),
             "EQUIDISTANT": (lambda r: r * end, lambda t: t / end),
-            "EQUISOLID": (lambda r: 2 * np.arcsin(r / 2), lambda t: 2 * np.sin(t / 2)),
-            "ORTHOGRAPHIC": (lambda r: np.arcsin(r * sin), lambda t: np.sin(t) / sin),
-            "STEREOGRAPHIC": (lambda r: 2 * np.arctan(r * tan), lambda t: np.tan(t / 2) / tan),
+            "EQUISOLID": (lambda r: 2 * np.arcsin(r / 2), lambda t: 2 * sin(t / 2)),
+            "ORTHOGRAPHIC": (lambda r: np.arcsin(r * side), lambda t: sin(t) / side),
+            "STEREOGRAPHIC": (lambda r: 2 * np.arctan(r * half), lambda t: tan(t / 2) / half),
         }
         if self.kind == "EQUIRECTANGULAR":
             west, north = camera["longitude_min"], camera["latitude_max"]
             self.unit = (camera["longitude_max"] - west, north - camera["latitude_min"]) / self.size
             self.center = (-west, north) / self.unit
-        elif self.kind == "KANNALA_BRANDT":
-            p = np.polynomial.Polynomial(np.insert([1, *camera["kannala_brandt"]], range(5), 0))
-            self.end = end = min(end, first_root(p.deriv()))
-            curves[self.kind] = lambda r: inverse(p, end, 0, r), p
+        elif name := next((name for name in CALIBRATED if name in camera), None):
+            # r in focal lengths, up to where it stops growing with θ.
+            curve = partial(CALIBRATED[name], camera[name])
+            self.end = end = rim(curve, end)
+            curves[self.kind] = lambda r: inverse(curve, end, 0, r), curve
+            if name in BENT:
+                self.bend = Bend(end, *BENT[name](camera[name], curve))
         elif self.kind == "LENS_POLYNOMIAL":
             k = np.array([camera[f"fisheye_polynomial_k{i}"] for i in range(5)])
             sign = -np.sign(k[1:][k[1:] != 0][0])
@@ -142,22 +174,29 @@ class PlainLens:
             self.unit, self.end = pixel, p(last)
             curves[self.kind] = lambda r: sign * p(r), lambda t: sign * inverse(p, last, hole, t)
         self.theta, self.radius = curves[self.kind]
+        if self.bend:
+            self.end = float(self.theta(np.array([self.bend.radius(self.bend.last)]))[0])
 
     def pixel_rays(self) -> Any:
         """Return the unit rays (height, width, 3) of all pixels' centres."""
         return self.rays(*np.meshgrid(*(np.arange(side) + 0.5 for side in self.size)))
 
+    @np.errstate(divide="ignore", invalid="ignore")
     def rays(self, x: Any, y: Any) -> Any:
         """Return the unit rays (..., 3) of pixel coordinates. NaN where the lens has none."""
         u, v = (x - self.center[0]) * self.unit[0], (self.center[1] - y) * self.unit[1]
         if self.kind == "EQUIRECTANGULAR":
             v = np.where(np.abs(v) <= np.pi / 2 + 1e-6, v, np.nan)
-            return np.stack([np.cos(v) * np.sin(u), np.sin(v), -np.cos(v) * np.cos(u)], axis=-1)
-        r, azimuth, last = np.hypot(u, v), np.arctan2(u, v), np.abs(self.radius(self.end))
+            return np.stack([cos(v) * sin(u), sin(v), -cos(v) * cos(u)], axis=-1)
+        point, last = v + 1j * u, np.abs(self.radius(self.end))
+        if self.bend:
+            point = self.bend.unbent(point, self.theta(np.minimum(np.abs(point), last)))
+        r, azimuth = np.abs(point), np.angle(point)
         theta = np.where(r <= last * (1 + 1e-14), self.theta(np.minimum(r, last)), np.nan)
-        right, up = np.sin(theta) * [np.sin(azimuth), np.cos(azimuth)]
-        return np.stack([right, up, -np.cos(theta)], axis=-1)
+        right, up = sin(theta) * [sin(azimuth), cos(azimuth)]
+        return np.stack([right, up, -cos(theta)], axis=-1)
 
+    @np.errstate(divide="ignore", invalid="ignore")
     def pixels(self, rays: Any) -> Any:
         """Return the pixel coordinates (..., 2) of rays (..., 3). NaN if the lens sees none."""
         x, y, z = np.moveaxis(rays, -1, 0)
@@ -166,10 +205,64 @@ class PlainLens:
             middle = (self.size[0] / 2 - self.center[0]) * self.unit[0]
             u -= 2 * np.pi * np.round((u - middle) / (2 * np.pi))
         else:
-            theta = np.arctan2(np.hypot(x, y), -z)
-            r = np.where(theta <= self.end * (1 + 1e-14), self.radius(theta), np.nan)
-            u, v = r * [np.sin(np.arctan2(x, y)), np.cos(np.arctan2(x, y))]
+            theta, direction = np.arctan2(np.hypot(x, y), -z), np.exp(1j * np.arctan2(x, y))
+            theta = np.where(theta <= self.end * (1 + 1e-14), theta, np.nan)
+            point = direction * self.radius(theta)
+            if self.bend:
+                point = self.bend.image(direction * self.bend.plane(theta))
+            u, v = point.imag, point.real
         return self.center + np.stack([u, -v], axis=-1) / self.unit
+
+
+class Bend:
+    """What moves the points of a lens that is not radial. A point is a number: up + i right.
+
+    It depends on the place in a plane. ``plane`` is a place's radius t at an angle, and ``radius``
+    is r at t.
+    """
+
+    def __init__(self, end: Any, plane: Any, radius: Any, tangential: Any, prism: Any, growth: Any):
+        self.plane, self.radius, self.tangential = plane, radius, tangential
+        self.prism, self.growth = prism, growth
+        self.last = last = float(plane(end))
+        t = np.sinh(np.linspace(0, np.arcsinh(last), 4097))
+        folds = np.flatnonzero(self.spread(t[1:]) <= 0)
+        if folds.size and (tangential or prism or growth):
+            self.last, last = t[folds[0]], t[folds[0] + 1]
+        while self.last < (middle := (self.last + last) / 2) < last:
+            self.last, last = (middle, last) if self.spread(middle) > 0 else (self.last, middle)
+
+    def spread(self, t: Any) -> Any:
+        """Return a lower bound of how far neighbours at t stay apart. At 0, they may meet."""
+        slope = (self.radius(t * (1 + 1e-6)) - self.radius(t * (1 - 1e-6))) / (2e-6 * t)
+        prism = np.abs(self.prism + 2 * self.growth * t * t)
+        moves = 2 * t * (3 * np.abs(self.tangential) + prism)
+        return np.minimum(slope, self.radius(t) / t) - moves
+
+    def image(self, places: Any) -> Any:
+        """Return the points at which the lens shows places of the plane."""
+        q = np.abs(places) ** 2
+        along = 2 * (np.conj(self.tangential) * places).real
+        sideways = self.tangential + self.prism + self.growth * q
+        return self.radial(places) + along * places + sideways * q
+
+    def radial(self, places: Any) -> Any:
+        """Return the points at which a radial lens shows places of the plane."""
+        t = np.maximum(np.abs(places), 1e-300)
+        return places / t * self.radius(t)
+
+    def unbent(self, points: Any, angles: Any) -> Any:
+        """Return the points of the radial lens, by Newton's method. ``angles`` are about right."""
+        places, h = self.plane(angles) * np.exp(1j * np.angle(points)), 1e-7
+        for _ in range(20):
+            error = points - self.image(places)
+            by_up = (self.image(places + h) - points + error) / h
+            by_right = (self.image(places + 1j * h) - points + error) / h
+            step = (np.conj(error) * by_right).imag + 1j * (np.conj(by_up) * error).imag
+            places = places + step / (np.conj(by_up) * by_right).imag
+            places = places * np.minimum(1, self.last / np.abs(places))
+        is_solved = np.abs(error) <= 1e-12 * (1 + np.abs(points))
+        return np.where(is_solved, self.radial(places), np.nan)
 
 
 def first_root(polynomial: Any) -> Any:
@@ -178,11 +271,45 @@ def first_root(polynomial: Any) -> Any:
     return min([root.real for root in roots if root.real > 0], default=np.inf)
 
 
-def inverse(polynomial: Any, last: float, least: float, values: Any) -> Any:
-    """Return t from 0 to ``last`` with the values of a polynomial that grows, by bisection."""
-    t = np.zeros(np.shape(values))
-    for step in last / 2.0 ** np.arange(1, 60):
-        t += np.where(polynomial(t + step) < values, step, 0)
+def ratio(above: Any, below: Any, t: Any) -> Any:
+    """Return t times the ratio of two polynomials in t²."""
+    top, bottom = np.polynomial.Polynomial(above), np.polynomial.Polynomial(below)
+    return t * (top(t * t) / bottom(t * t))
+
+
+def mixed(alpha: float, across: Any, along: Any) -> Any:
+    """Return the divisor of a projection between the one from a sphere and the perspective one."""
+    return alpha * np.hypot(across, along) + (1 - alpha) * along
+
+
+@np.errstate(divide="ignore", invalid="ignore")
+def rim(curve: Any, last: float) -> float:
+    """Return the angle, up to ``last``, at which a lens's r stops growing, or becomes infinite."""
+    t = np.linspace(0, last, 4097)
+    falls = np.flatnonzero(~(np.diff(curve(t)) > 0) | (curve(t[1:]) < 0))
+    low, high = (t[max(falls[0] - 1, 0)], t[falls[0] + 1]) if falls.size else (last, last)
+    for _ in range(100):
+        near, far = low + (high - low) / 3, high - (high - low) / 3
+        low, high = (near, high) if 0 < curve(near) < curve(far) else (low, far)
+    return float(low)
+
+
+@np.errstate(divide="ignore", invalid="ignore")
+def inverse(curve: Any, last: float, least: float, values: Any) -> Any:
+    """Return t from 0 to ``last`` with the values of a curve that grows. The Illinois method."""
+    goal, t = np.arctan(values), np.linspace(0, last, 4097)  # The angle is finite for infinite r.
+    known = np.arctan(curve(t))
+    upper = np.clip(np.searchsorted(known, goal), 1, 4096)
+    low, high, below, above = t[upper - 1], t[upper], known[upper - 1] - goal, known[upper] - goal
+    sides: Any = (False, False)
+    for _ in range(16):
+        t = np.clip(high - (high - low) * (above / np.maximum(above - below, 1e-300)), low, high)
+        error = np.arctan(curve(t)) - goal
+        sides = error < 0, error >= 0, *sides[:2]
+        # An end that stays a second time counts half.
+        below = np.where(sides[0], error, np.where(sides[-1], below / 2, below))
+        above = np.where(sides[1], error, np.where(sides[-2], above / 2, above))
+        low, high = np.where(sides[0], t, low), np.where(sides[1], t, high)
     return np.where(values >= least, t, np.nan)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from lightfield.core import units
 from lightfield.core.files import absolute_path
-from lightfield.core.names import MESH, SEQUENCE_PAGE, SPLITS, VIDEO
+from lightfield.core.names import HEADS, IMU, MESH, SEQUENCE_PAGE, SPLITS, VIDEO
 from lightfield.engine.read_files import check_since_plan
 from lightfield.exporters import EXPORTERS, lists_beside_views
 from lightfield.formats import blend
@@ -297,6 +297,8 @@ def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, 
         (f"{IMAGES}/{first}.exr …", f"the views: scene-linear Rec. 709 R, G, B as half{depth}"),
         ("lightfield.json", "the lens once; position, rotation, and world_matrix of each view"),
     ]
+    if IMU in lightfield.content:
+        meanings.append((f"{IMU}/", "an inertial sensor: measurements, true motion, views' times"))
     passes = [each for each in lightfield.passes if not is_group(each)]
     if lightfield.views[0].flow:
         passes.append(FLOW)
@@ -305,6 +307,8 @@ def files(folder: Path, lightfield: LightField, valid: bool) -> list[tuple[str, 
         meanings.append((f"{GROUP_PREFIX}*/", "the light of each light group; the sum is the view"))
     if (folder.parent / SPLITS).is_file():
         meanings.append((f"../{SPLITS}", "which of the scene's views train, and which test"))
+    if lightfield.head:
+        meanings.append((f"../{HEADS}", "the cameras that share a body, and their views"))
     for reprojection in sorted(folder.glob(f"*/{NAME}")):
         reprojected = LightField.read(reprojection)
         meanings.append(

@@ -252,7 +252,20 @@ class ReprojectionJob:
         changes: dict[str, Any] = {"reprojection": self.published}
         if self.lightfield.passes:
             changes["passes"] = [each.name for each in self.passes]
+        if head := self.lightfield.head:
+            changes[lightfield.HEAD] = self._turned_head(head)
         return self.lightfield.changed(lens, views, depth=depth, **changes)
+
+    def _turned_head(self, head: lightfield.HeadCamera) -> dict[str, Any]:
+        """Return the place of the new images' camera in its head.
+
+        The faces of a cube map are several cameras, so they have no place.
+        """
+        if len(self.targets) > 1:
+            return {"name": head.head, "camera": head.name}
+        (target,) = self.targets
+        turned = _world_from_target(head.body_from_camera, target)
+        return replace(head, body_from_camera=turned).to_json()
 
     def views(self) -> list[SourceView]:
         """Return the chosen views, in the order of their names or frames."""

@@ -38,6 +38,8 @@ def run(stage: Reproject) -> None:
     # lens_map.py has already reported the maps in files.
     if stage.lens_map is None:
         lens_map.report(maps)
+        for clipped in {target.lens.clipped for target in job.targets} - {None}:
+            print(f"warning: {clipped}", file=sys.stderr)
     label = f"reproject to {stage.output_dir} {stage.views or ''}".rstrip()
     progress = Progress(len(views), label)
     paths: list[Path] = []

@@ -115,12 +115,14 @@ class ReaderSettings(Settings):
     )
 
 
-def as_list(count: int) -> BeforeValidator:
-    """Return a validator that makes a tuple of a YAML list of ``count`` values."""
+def as_list(count: int, most: int | None = None) -> BeforeValidator:
+    """Return a validator that makes a tuple of a YAML list of ``count`` to ``most`` values."""
+    counts = range(count, (most or count) + 1)
 
     def check(value: Any) -> Any:
-        if not isinstance(value, list | tuple) or len(value) != count:
-            raise ValueError(f"must be a list of {count} values")
+        if not isinstance(value, list | tuple) or len(value) not in counts:
+            text = f"{count} to {most}" if most else f"{count}"
+            raise ValueError(f"must be a list of {text} values")
         return tuple(value)
 
     return BeforeValidator(check)

@@ -10,6 +10,7 @@ from lightfield.core.names import FILE, INVENTORY, VIEWS
 from lightfield.engine.stage import ByHand, Stage, option, reads, writes
 from lightfield.exporters import EXPORTERS, export_settings_of, list_path
 from lightfield.exporters.base import Export, ExportSettings
+from lightfield.geometry.boards import Boards
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.settings.base import Settings, checked
 
@@ -60,6 +61,7 @@ class MeshSettings(Settings):
     view_layers: Literal["all"] | list[str] | None = Field(
         None, description="As in the scene YAML."
     )
+    targets: Boards | None = Field(None, description="As in the scene YAML.")
     numbered: bool = Field(
         False,
         description="Whether objects.json lists the numbers that objects have in the passes object "

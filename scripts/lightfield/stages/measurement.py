@@ -414,3 +414,32 @@ class EvaluateSurface(Stage[SurfaceSettings]):
     candidate: Path = reads("the reconstructed surface", positional=True, metavar="SURFACE")
     reference: Path = reads("the true surface")
     output: Path | None = writes("JSON to write", None)
+
+
+class CalibrationFileSettings(Settings):
+    """The settings of scripts/evaluate_calibration.py."""
+
+    camera: str | None = Field(
+        None, description="Name or number of the camera, for a file with several."
+    )
+    model: Literal["brown_conrady", "kannala_brandt"] | None = Field(
+        None,
+        description="Lens of four coefficients in OpenCV's file, which do not say it: the usual "
+        "lens (brown_conrady), or the fisheye (kannala_brandt).",
+    )
+
+
+class EvaluateCalibration(Stage[CalibrationFileSettings]):
+    """Compares a camera's calibration with the true lens."""
+
+    name = "evaluate_calibration"
+    function = "lightfield.measurement.calibration_error:evaluate"
+    by_hand = CalibrationFileSettings
+
+    lightfield: Path = reads(
+        "lightfield.json of the dataset, or of a reprojection",
+        positional=True,
+        metavar="LIGHTFIELD",
+    )
+    calibration: Path = reads("file that the calibration's program wrote")
+    output: Path | None = writes("folder to write figures and a map of the error to", None)

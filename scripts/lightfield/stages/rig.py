@@ -1,14 +1,15 @@
 """The stages that place a rig's cameras, check them, and write the light field."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainSerializer
 
 from lightfield.configuration.capture import LightfieldSettings
-from lightfield.core.names import FILE, INVENTORY
+from lightfield.core.names import FILE, IMU, INVENTORY
 from lightfield.engine.stage import ByHand, PlainStage, Stage, option, reads, writes
+from lightfield.geometry.boards import Boards
 from lightfield.geometry.rigs import Random, as_written
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.settings.base import Settings
@@ -35,6 +36,7 @@ class FreePlacesSettings(Settings):
     view_layers: Literal["all"] | list[str] | None = Field(
         None, description="As in the scene YAML."
     )
+    targets: Boards | None = Field(None, description="As in the scene YAML.")
 
 
 class FreePlaces(Stage[FreePlacesSettings]):
@@ -79,6 +81,22 @@ class MakeLightfield(Stage[LightfieldSettings]):
     model: Path | None = reads("JSON that scripts/import_model.py wrote, for a model", None)
     places: Path | None = reads("JSON that scripts/free_places.py wrote, for a random rig", None)
     output: Path = writes("lightfield.json to write")
+
+    def made(self) -> Iterator[Path]:
+        yield from super().made()
+        yield self.output.with_name(IMU)
+
+
+class FindCorners(PlainStage):
+    """Finds the corners of calibration boards in each view."""
+
+    name = "corners"
+    function = "lightfield.rendering.inspection.corners:write"
+
+    blend: Path = reads("the scene's .blend")
+    lightfield: Path = reads("lightfield.json of the dataset")
+    inventory: Path | None = reads(INVENTORY, None)
+    output: Path = writes("JSON to write")
 
 
 class CheckCameras(PlainStage):

@@ -23,6 +23,7 @@ from lightfield.configuration.scene_source import (
 from lightfield.engine.stage import PlainStage, Stage, cause, option, reads, writes
 from lightfield.exporters import Exports
 from lightfield.formats.inventory import read_inventory
+from lightfield.geometry.boards import Boards
 from lightfield.geometry.rigs.rig import Frame
 from lightfield.settings.base import Name, Settings
 
@@ -128,6 +129,7 @@ class InventorySettings(Settings):
     view_layers: Literal["all"] | list[str] | None = Field(
         None, description="As in the scene YAML."
     )
+    targets: Boards | None = Field(None, description="As in the scene YAML.")
     allow_missing: bool | None = Field(None, description="As in the scene YAML.")
     motion_blur: bool | None = Field(None, description="As in the scene YAML.")
     rendered_frames: list[int | Literal["file"]] = Field(

@@ -75,3 +75,13 @@ class ListSplits(PlainStage):
 
     lightfields: list[Path] = reads("the rigs' lightfield.json files", positional=True)
     output: Path = writes("splits.json to write")
+
+
+class ListHeads(PlainStage):
+    """Lists the cameras of a scene's heads, and the views that they take at each place."""
+
+    name = "heads"
+    function = "lightfield.products.heads:write_heads"
+
+    lightfields: list[Path] = reads("the rigs' lightfield.json files", positional=True)
+    output: Path = writes("heads.json to write")

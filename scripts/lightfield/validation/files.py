@@ -36,10 +36,10 @@ from lightfield.formats.layout import (
     Manifest,
     expected_pass_files,
     file_names,
-    json_files,
     pass_files,
     read_set,
     rendered,
+    side_files,
     source_view,
     view_files,
 )
@@ -300,7 +300,7 @@ def remove_strays(
     extras, lists, exports = of_exports(absolute_path(dataset), sets, views, export_lists)
     if exports.passed is False:
         return 0
-    owned = {*lists, *json_files(sets), *(file.path for file in [*views, *extras])}
+    owned = {*lists, *side_files(sets), *(file.path for file in [*views, *extras])}
     _, strays = _sorted_out(dataset, sets, owned)
     # Leave hidden files: another process is writing them now.
     drawn = {path.name for path in (dataset / REPORT).glob("[!.]*")}

@@ -230,7 +230,7 @@ def _check_files(
 ) -> tuple[dict[str, str], list[Check]]:
     """Return the SHA-256 of each published file, and the checks of the files and of their sums."""
     sums = {file.path: (fact.bytes, fact.checksum) for file, fact in facts.items()}
-    sums |= _sums_of_json_files(dataset, sets)
+    sums |= _sums_of_side_files(dataset, sets)
     published, files_check = files.listing(dataset, sets, {*export_files, *sums})
     digests = {
         path: sums[path][1] if path in sums else sha256(dataset / path) for path in published
@@ -238,9 +238,9 @@ def _check_files(
     return digests, [files_check, files.checksums(made, sums, digests, sets)]
 
 
-def _sums_of_json_files(dataset: Path, sets: Sequence[ImageSet]) -> _Sums:
-    """Return the sums of the JSON files beside images."""
-    paths = {name: dataset / name for name in layout.json_files(sets)}
+def _sums_of_side_files(dataset: Path, sets: Sequence[ImageSet]) -> _Sums:
+    """Return the sums of the files beside images."""
+    paths = {name: dataset / name for name in layout.side_files(sets)}
     return {
         name: (path.stat().st_size, sha256(path)) for name, path in paths.items() if path.is_file()
     }

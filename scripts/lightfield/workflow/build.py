@@ -330,6 +330,14 @@ class Build:
             if dataset.scene_folder == wildcards["scene"] and dataset.splits
         ]
 
+    def head_lightfields(self, wildcards: Wildcards) -> list[str]:
+        """Return the light fields of a scene's rigs that are cameras of heads."""
+        return [
+            dataset.paths.lightfield
+            for dataset in self.datasets.values()
+            if dataset.scene_folder == wildcards["scene"] and dataset.heads
+        ]
+
     # Families.
 
     @cached_property

@@ -88,12 +88,32 @@ def check_cameras(dataset: Dataset) -> Fields | None:
     }
 
 
+@_of_dataset
+def corners(dataset: Dataset) -> Fields | None:
+    if dataset.corners is None:
+        return None
+    return {
+        "blend": dataset.blend,
+        "lightfield": dataset.paths.lightfield,
+        "inventory": dataset.blend_inventory,
+        "output": dataset.corners,
+    }
+
+
 def splits(build: Build, wildcards: Wildcards) -> Fields | None:
     lightfields = build.split_lightfields(wildcards)
     if not lightfields:
         return None
     paths = Paths(build.config.results, build.config.work, wildcards["scene"])
     return {"lightfields": lightfields, "output": paths.splits}
+
+
+def heads(build: Build, wildcards: Wildcards) -> Fields | None:
+    lightfields = build.head_lightfields(wildcards)
+    if not lightfields:
+        return None
+    paths = Paths(build.config.results, build.config.work, wildcards["scene"])
+    return {"lightfields": lightfields, "output": paths.heads}
 
 
 def render(build: Build, wildcards: Wildcards) -> Fields | None:

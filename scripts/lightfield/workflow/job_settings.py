@@ -28,6 +28,7 @@ from lightfield.core.files import sha256
 from lightfield.core.names import MESH, ROOT, SOFTBOXES, VIDEO, VIEWS
 from lightfield.exporters import export_settings_of
 from lightfield.exporters.base import Export, ExportSettings
+from lightfield.geometry import rigs
 from lightfield.geometry.rigs import Poses
 from lightfield.imaging import blender_looks
 from lightfield.planning.loading import datasets_of, rendered_frames
@@ -159,6 +160,7 @@ def inventory(dataset: Dataset) -> InventorySettings:
     return InventorySettings.of(
         scene_name=source.scene_name,
         view_layers=source.view_layers,
+        targets=source.targets,
         allow_missing=source.allow_missing,
         motion_blur=written.render.motion_blur,
         rendered_frames=rendered_frames(datasets),
@@ -189,6 +191,7 @@ def free_places(dataset: Dataset) -> FreePlacesSettings:
         frame=source.frame,
         scene_name=source.scene_name,
         view_layers=source.view_layers,
+        targets=source.targets,
     )
 
 
@@ -224,6 +227,7 @@ def mesh(dataset: Dataset) -> MeshSettings:
         frame=source.frame,
         scene_name=source.scene_name,
         view_layers=source.view_layers,
+        targets=source.targets,
         numbered=not {"object", "instance"}.isdisjoint(dataset.render.passes or ()),
     )
 
@@ -429,8 +433,12 @@ def sequence_page(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
 
 
 def probes(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:
-    """Return the settings of a scene's probe cameras. They are its first rig's settings."""
-    return "probes", lightfield(build.first_of_scene(wildcards["scene"]))
+    """Return the settings of a scene's probe cameras. They are its first rig's, without an imu."""
+    settings = lightfield(build.first_of_scene(wildcards["scene"]))
+    if isinstance(settings.rig, rigs.Path):
+        rig = settings.rig.model_copy(update={"imu": None})
+        settings = settings.model_copy(update={"rig": rig})
+    return "probes", settings
 
 
 def gpu_check(build: Build, wildcards: Wildcards) -> tuple[str, Settings]:

@@ -179,6 +179,7 @@ LIGHTFIELD = Job(
     fields.lightfield,
     times="{scene}/{rig}/cameras/lightfield",
     file=lambda paths: paths.lightfield,
+    has_bundle=True,
     is_local=True,
 )
 CHECK_CAMERAS = Job(
@@ -188,6 +189,15 @@ CHECK_CAMERAS = Job(
     _costs(BLENDER),
     fields=fields.check_cameras,
     times="{scene}/{rig}/cameras/check_cameras",
+)
+CORNERS = Job(
+    "{scene}/{rig}/corners",
+    rig.FindCorners,
+    "cameras",
+    _costs(BLENDER),
+    fields=fields.corners,
+    times="{scene}/{rig}/cameras/corners",
+    file=lambda paths: paths.corners,
 )
 PROBE_CAMERAS = Job(
     "{scene}/probe_cameras",
@@ -256,6 +266,14 @@ SPLITS = Job(
     "cameras",
     _costs(JOB),
     fields=fields.splits,
+    is_local=True,
+)
+HEADS = Job(
+    "{scene}/heads",
+    views.ListHeads,
+    "cameras",
+    _costs(JOB),
+    fields=fields.heads,
     is_local=True,
 )
 EXPORT = Job(

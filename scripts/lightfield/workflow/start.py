@@ -15,6 +15,9 @@ from lightfield.core import disk_space, leftovers, units
 from lightfield.core.disk_space import Need, check_folder
 from lightfield.core.errors import UserError
 from lightfield.core.files import sha256
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.base import RadialLens
+from lightfield.geometry.ray_table import ray_table
 from lightfield.planning.cost import light_group_count, rendering, temporary_bytes, view_cost
 from lightfield.planning.time_limits import limit_of_render
 from lightfield.stages.measurement import RENDERS_ON
@@ -22,7 +25,14 @@ from lightfield.workflow import presence
 from lightfield.workflow.build import Wildcards
 from lightfield.workflow.job_plan import JobPlan, PlannedJob
 from lightfield.workflow.job_requests import JobRequests
-from lightfield.workflow.jobs import BUILD_MEMBERS, CHECK_BLEND, GPU_CHECK, INVENTORY, RENDER
+from lightfield.workflow.jobs import (
+    BUILD_MEMBERS,
+    CHECK_BLEND,
+    GPU_CHECK,
+    INVENTORY,
+    RENDER,
+    REPROJECT,
+)
 from lightfield.workflow.run import Run
 from lightfield.workflow.run_config import NOTES
 from lightfield.workflow.slurm import check_slurm
@@ -56,6 +66,7 @@ class StartChecks:
         self._check_memory()
         self._check_disk_space()
         self._check_run_times()
+        self._check_lenses()
         self._check_times()
 
     def announce_refusals(self) -> bool:
@@ -66,6 +77,7 @@ class StartChecks:
             self._check_memory,
             self._check_disk_space,
             self._check_run_times,
+            self._check_lenses,
             self._check_times,
         ]
         planned_jobs = self._plan.planned_jobs()
@@ -165,6 +177,43 @@ class StartChecks:
         for name, dataset in {each.sequence_name: each for each in datasets}.items():
             if problem := too_short_partition(dataset):
                 print(f"warning: {name}: {problem}", file=sys.stderr)
+
+    def _check_lenses(self) -> None:
+        """Warn of lenses whose equation ends inside the image.
+
+        Raises `UserError` for a lens that would not be rendered exactly.
+        """
+        lenses, rendered = self._lenses()
+        for name, lens in lenses.items():
+            if lens.clipped:
+                print(f"warning: {name}: {lens.clipped}", file=sys.stderr)
+        for name in rendered:
+            lens = lenses[name]
+            if isinstance(lens, RadialLens) and not lens.in_cycles:
+                try:
+                    ray_table(lens)
+                except UserError as error:
+                    raise UserError(f"{name}: {error}") from None
+
+    def _lenses(self) -> tuple[dict[str, Lens], set[str]]:
+        """Return the lenses of the planned views, by the names of their datasets.
+
+        Also returns the names of the datasets that are rendered.
+        """
+        run, lenses, rendered = self._run, dict[str, Lens](), set[str]()
+        for planned in self._plan.planned_jobs():
+            if planned.job not in (RENDER, REPROJECT):
+                continue
+            dataset = run.asked(run.build.dataset, planned.names)
+            lens = dataset.rig.camera.make()
+            if planned.job is RENDER:
+                lenses[dataset.sequence_name] = lens
+                if not dataset.imported:
+                    rendered.add(dataset.sequence_name)
+            elif reprojection := run.asked(run.build.reprojection, planned.names):
+                name = f"{dataset.sequence_name}/{planned.names['reprojection']}"
+                lenses[name] = reprojection.lens(lens)
+        return lenses, rendered
 
     def _check_times(self) -> None:
         """Raise `UserError` for a file that jobs read, and whose time is in the future.

@@ -58,10 +58,10 @@ def _keep_their_keys(plan: JobPlan, dataset: Dataset) -> bool:
 
 
 def _of_views(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of a rig that place the views it has: without its split.
+    """Return the settings of a rig that place the views it has: without its split and its imu.
 
     The number of views moves no camera of a random rig.
     """
     rig = settings["rig"]
-    left_out = {"split", "count"} if rig["type"] == "random" else {"split"}
+    left_out = {"split", "imu"} | ({"count"} if rig["type"] == "random" else set())
     return {key: value for key, value in rig.items() if key not in left_out}

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import pycolmap
 from numpy.polynomial import polynomial
 from numpy.typing import NDArray
 
@@ -73,6 +74,23 @@ class OpenCVFisheye:
         radius = theta * polynomial.polyval(theta**2, [1, self.k1, self.k2, self.k3, self.k4])
         along = _along(radius, side)
         return np.stack([self.cx + self.fx * along * x, self.cy - self.fy * along * y], axis=-1)
+
+
+@dataclass(frozen=True)
+class OfColmap:
+    """A camera that COLMAP's own code projects. ``parameters`` are the ``model``'s."""
+
+    width: int
+    height: int
+    model: str
+    parameters: tuple[float, ...]
+
+    def pixels(self, rays: Floats) -> Floats:
+        camera = pycolmap.Camera(
+            model=self.model, width=self.width, height=self.height, params=self.parameters
+        )
+        directions = (rays * [1, -1, -1]).reshape(-1, 3)
+        return np.asarray(camera.img_from_cam(directions)).reshape(*rays.shape[:-1], 2)
 
 
 @dataclass(frozen=True)

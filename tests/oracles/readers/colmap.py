@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.files import reading
-from oracles.readers.cameras import Camera, OpenCVFisheye, Panorama, Pinhole
+from oracles.readers.cameras import Camera, OfColmap, OpenCVFisheye, Panorama, Pinhole
 from oracles.readers.contents import (
     FLOAT32,
     Cloud,
@@ -40,11 +40,27 @@ def _panorama(width: int, height: int, w: float, h: float) -> Panorama:
     return Panorama(width, height, -math.pi, east, math.pi / 2, south)
 
 
+def _own(model: str) -> Callable[..., Camera]:
+    """Return what makes a camera of one of COLMAP's models from its size and its parameters."""
+    return lambda width, height, *parameters: OfColmap(width, height, model, parameters)
+
+
 # COLMAP's id, name and class of each model, with the number of its parameters.
 MODELS: dict[int, tuple[str, Callable[..., Camera], int]] = {
     1: ("PINHOLE", Pinhole, 4),
     5: ("OPENCV_FISHEYE", OpenCVFisheye, 8),
     17: ("EQUIRECTANGULAR", _panorama, 2),
+} | {
+    number: (name, _own(name), count)
+    for number, name, count in (
+        (4, "OPENCV", 8),
+        (6, "FULL_OPENCV", 12),
+        (7, "FOV", 5),
+        (10, "THIN_PRISM_FISHEYE", 12),
+        (11, "RAD_TAN_THIN_PRISM_FISHEYE", 16),
+        (13, "DIVISION", 5),
+        (16, "EUCM", 6),
+    )
 }
 NAMES = {name: number for number, (name, _, _) in MODELS.items()}
 

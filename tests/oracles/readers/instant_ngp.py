@@ -12,7 +12,7 @@ import numpy as np
 
 from lightfield.core.files import read_json, reading
 from lightfield.core.names import PARTS
-from oracles.readers.cameras import Camera, Panorama, Pinhole, PolynomialFisheye
+from oracles.readers.cameras import Camera, OfColmap, Panorama, Pinhole, PolynomialFisheye
 from oracles.readers.contents import (
     DepthMap,
     Exported,
@@ -50,7 +50,7 @@ def read(path: Path) -> Exported:
                     exported.expect_picture(f"{path}: {place}: depth_path", picture, name, "{}.png")
                     # The loader scales a pinhole's rays to length 1 along the axis. Other rays have
                     # length 1.
-                    is_pinhole = isinstance(exported.cameras[0].camera, Pinhole)
+                    is_pinhole = isinstance(exported.cameras[0].camera, Pinhole | OfColmap)
                     meaning = "z" if is_pinhole else "distance"
                     unit = number(content["integer_depth_scale"])
                     exported.add_picture(picture, name, "steps", meaning=meaning, unit=unit)
@@ -89,6 +89,9 @@ def _camera(path: Path, content: dict[str, Any], exported: Exported) -> Camera:
         return Panorama(width, height, -math.pi, math.pi, math.pi / 2, -math.pi / 2)
     for key, focal, side in (("camera_angle_x", fx, width), ("camera_angle_y", fy, height)):
         exported.expect(f"{path}: {key}", content[key], 2 * math.atan(side / (2 * focal)))
+    distortion = [number(content.get(key, 0.0)) for key in ("k1", "k2", "p1", "p2")]
+    if any(distortion):
+        return OfColmap(width, height, "OPENCV", (fx, fy, cx, cy, *distortion))
     return Pinhole(width, height, fx, fy, cx, cy)
 
 
@@ -109,7 +112,7 @@ def _compare_options(
     )
     if with_depth:
         # The loader scales a pinhole's rays to length 1 along the axis. Other rays have length 1.
-        meaning = "z" if isinstance(exported.cameras[0].camera, Pinhole) else "distance"
+        meaning = "z" if isinstance(exported.cameras[0].camera, Pinhole | OfColmap) else "distance"
         exported.depth_map = DepthMap(
             f"{path}: integer_depth_scale",
             path.parent / str(with_depth[0]["depth_path"]),

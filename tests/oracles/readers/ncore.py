@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.files import read_json, reading
 from lightfield.geometry.exposure import pose_between
-from oracles.readers.cameras import Camera, FTheta, Pinhole
+from oracles.readers.cameras import Camera, FTheta, OfColmap, OpenCVFisheye, Pinhole
 from oracles.readers.contents import (
     Cloud,
     Exported,
@@ -216,13 +216,21 @@ def _camera(attributes: dict[str, Any], place: str, exported: Exported) -> Camer
     cx, cy = numbers(parameters["principal_point"], (2,)).tolist()
     kind = attributes["camera_model_type"]
     if kind == "opencv-pinhole":
-        for key, count in (("radial", 6), ("tangential", 2), ("thin_prism", 4)):
-            values = parameters[f"{key}_coeffs"]
-            exported.expect(f"{place}: {key}_coeffs", values, [0.0] * count)
+        prism = parameters["thin_prism_coeffs"]
+        exported.expect(f"{place}: thin_prism_coeffs", prism, [0.0] * 4)
         fx, fy = numbers(parameters["focal_length"], (2,)).tolist()
+        k1, k2, *others = numbers(parameters["radial_coeffs"], (6,)).tolist()
+        tangential = numbers(parameters["tangential_coeffs"], (2,)).tolist()
+        distortion = (k1, k2, *tangential, *others)
+        if any(distortion):
+            return OfColmap(width, height, "FULL_OPENCV", (fx, fy, cx, cy, *distortion))
         return Pinhole(width, height, fx, fy, cx, cy)
+    if kind == "opencv-fisheye":
+        fx, fy = numbers(parameters["focal_length"], (2,)).tolist()
+        radial = numbers(parameters["radial_coeffs"], (4,)).tolist()
+        return OpenCVFisheye(width, height, fx, fy, cx, cy, *radial)
     if kind != "ftheta":
-        raise ValueError(f"camera_model_type: {kind!r} is not opencv-pinhole or ftheta")
+        raise ValueError(f"camera_model_type: {kind!r} is none of NCore's")
     exported.expect(f"{place}: reference_poly", parameters["reference_poly"], "ANGLE_TO_PIXELDIST")
     forward = numbers(parameters["angle_to_pixeldist_poly"], (6,))
     largest = number(parameters["max_angle"])

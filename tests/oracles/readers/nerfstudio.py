@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lightfield.core.files import read_json, reading
-from oracles.readers.cameras import Camera, OpenCVFisheye, Panorama, Pinhole
+from oracles.readers.cameras import Camera, OfColmap, OpenCVFisheye, Panorama, Pinhole
 from oracles.readers.contents import (
     Exported,
     ExportedCamera,
@@ -71,8 +71,8 @@ def _add_pictures(
     exported.add_picture(colour, view, "colour", development=development(options))
     exported.add_mask(folder / str(frame.get("mask_path", f"masks/{view}.png")), view)
     if "depth_file_path" in frame:
-        # A pinhole's rays have length 1 along the axis. Other rays have length 1.
-        is_pinhole = isinstance(exported.cameras[0].camera, Pinhole)
+        # Rays of OPENCV and FISHEYE624 have length 1 along the axis. Other rays have length 1.
+        is_pinhole = isinstance(exported.cameras[0].camera, Pinhole | OfColmap)
         meaning = "z" if is_pinhole else "distance"
         depth = folder / str(frame["depth_file_path"])
         exported.add_picture(depth, view, "steps", meaning=meaning, unit=0.001)
@@ -84,10 +84,19 @@ def _camera(content: dict[str, Any]) -> Camera:
     fx, fy, cx, cy = (number(content[key]) for key in ("fl_x", "fl_y", "cx", "cy"))
     model = content["camera_model"]
     if model == "OPENCV":
-        undistorted = [number(content[key]) for key in ("k1", "k2", "p1", "p2")]
-        if any(undistorted):
-            raise ValueError(f"camera_model: has the distortion {undistorted}; must be zeros")
-        return Pinhole(width, height, fx, fy, cx, cy)
+        k1, k2, k3, k4, p1, p2 = (
+            number(content.get(key, 0.0)) for key in ("k1", "k2", "k3", "k4", "p1", "p2")
+        )
+        if k4:
+            raise ValueError("k4: is r⁸'s factor to nerfstudio, and a divisor's to OpenCV")
+        if not any((k1, k2, k3, p1, p2)):
+            return Pinhole(width, height, fx, fy, cx, cy)
+        parameters = (fx, fy, cx, cy, k1, k2, p1, p2, k3, 0.0, 0.0, 0.0)
+        return OfColmap(width, height, "FULL_OPENCV", parameters)
+    if model == "FISHEYE624":
+        distortion = numbers(content["distortion_params"], (12,)).tolist()
+        name = "RAD_TAN_THIN_PRISM_FISHEYE"
+        return OfColmap(width, height, name, (fx, fy, cx, cy, *distortion))
     if model == "OPENCV_FISHEYE":
         k1, k2, k3, k4 = (number(content[f"k{index}"]) for index in range(1, 5))
         return OpenCVFisheye(width, height, fx, fy, cx, cy, k1, k2, k3, k4)

@@ -1,12 +1,11 @@
 """Checks exports with the views that they read."""
 
-from collections.abc import Sequence
-
 from lightfield.configuration.scene_blocks import SceneBlocks, look_of
 from lightfield.configuration.scene_checks.names import check_rigs, check_sources
 from lightfield.core.names import VIEWS
 from lightfield.exporters.base import NO_DEPTH, NOT_EXR, Export
 from lightfield.formats import light_groups, published
+from lightfield.geometry.lenses import CameraSettings
 from lightfield.geometry.rigs import Poses, Rig
 
 
@@ -20,10 +19,10 @@ def _check_export(blocks: SceneBlocks, export_key: str, export: Export) -> None:
     """Check that an export's rigs and sources exist, and that its consumer can take them."""
     rigs_key = f"{export_key}.{export.rigs_key}"
     check_rigs(blocks, rigs_key, export.chosen_rigs or ())
-    _check_joined_rigs(blocks, rigs_key, export.joined_rigs)
     key = f"{export_key}.sources"
     developments = blocks.developments
     check_sources(key, export.sources, developments)
+    _check_joined_rigs(blocks, rigs_key, export)
     if look_of(export) and not any(
         source == VIEWS or "exr" in developments[source].formats for source in export.sources
     ):
@@ -47,15 +46,19 @@ def _check_export(blocks: SceneBlocks, export_key: str, export: Export) -> None:
         _check_exported_rigs(blocks, export_key, rigs_key, export, source)
 
 
-def _check_joined_rigs(blocks: SceneBlocks, key: str, names: Sequence[str]) -> None:
-    """Check that rigs can go into one export, which has one lens and one split."""
+def _check_joined_rigs(blocks: SceneBlocks, key: str, export: Export) -> None:
+    """Check that rigs can go into one export, which has one split, and lenses that go together."""
+    names = export.joined_rigs
     for name in names:
         first, rig = blocks.rigs[names[0]], blocks.rigs[name]
         if first.split in ("validation", "test"):
             raise ValueError(f"{key}: begins with {names[0]}, which tests; name a rig that trains")
-        for setting in ("camera", "frames"):
-            if getattr(rig, setting) != getattr(first, setting):
-                raise ValueError(f"rigs.{name}.{setting}: must be as in {names[0]}; see {key}")
+        for source in export.sources:
+            lenses = (_camera_of(blocks, each, source).make() for each in (first, rig))
+            if not export.joins(*lenses):
+                raise ValueError(f"rigs.{name}.camera: must be as in {names[0]}; see {key}")
+        if rig.frames != first.frames:
+            raise ValueError(f"rigs.{name}.frames: must be as in {names[0]}; see {key}")
         if (rig.split is None) != (first.split is None):
             raise ValueError(
                 f"{key}: only one of {names[0]} and {name} has a split; give both a split, or none"
@@ -101,7 +104,7 @@ def _export_refusal(blocks: SceneBlocks, export: Export, rig: Rig, source: str) 
     if rig.is_omnidirectional:
         return "has views without a centre, as omnidirectional stereo has"
     reprojection = blocks.developments.get(source)
-    camera = (reprojection and reprojection.camera) or rig.camera
+    camera = _camera_of(blocks, rig, source)
     is_rendered = renders_depth(blocks, rig)
     has_depth = is_rendered and (reprojection is None or reprojection.has_depth)
     lacks_surfaces = export.needs_surfaces and not is_rendered
@@ -114,6 +117,12 @@ def _export_refusal(blocks: SceneBlocks, export: Export, rig: Rig, source: str) 
     if source not in blocks.reprojections:
         return f"{refusal}; export the sensor's source"
     return f"{refusal}; give reprojections.{source} format: exr"
+
+
+def _camera_of(blocks: SceneBlocks, rig: Rig, source: str) -> CameraSettings:
+    """Return the camera of the views of a rig in a source."""
+    reprojection = blocks.developments.get(source)
+    return (reprojection and reprojection.camera) or rig.camera
 
 
 def renders_depth(blocks: SceneBlocks, rig: Rig) -> bool:

@@ -21,7 +21,14 @@ def check_rigs(blocks: SceneBlocks, key: str, names: Iterable[str]) -> None:
     """Check that there are rigs of these names."""
     for name in names:
         if name not in blocks.rigs:
+            cameras = [
+                rig
+                for rig, settings in blocks.rigs.items()
+                if settings.mount and settings.mount.head == name
+            ]
             hint = suggestion(name, blocks.rigs)
+            if cameras:
+                hint = f"; it is a head, whose rigs are {', '.join(cameras)}"
             raise ValueError(f"{key}: there is no rig {name!r}{hint}")
 
 

@@ -3,7 +3,7 @@
 from lightfield.configuration.reprojections import LIGHT_GROUPS, ReprojectionEntry
 from lightfield.configuration.scene_blocks import SceneBlocks
 from lightfield.configuration.scene_checks.names import check_folder, check_rigs
-from lightfield.core.names import MESH, RENDERED, VIDEO
+from lightfield.core.names import IMU, MESH, RENDERED, VIDEO
 from lightfield.formats import light_groups
 from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
 from lightfield.settings.base import suggestion
@@ -12,6 +12,7 @@ from lightfield.settings.base import suggestion
 _NEIGHBOURS = {
     "exr",
     "exports",
+    IMU,
     MESH,
     "panorama",
     RENDERED,

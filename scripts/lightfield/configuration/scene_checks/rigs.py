@@ -10,9 +10,10 @@ from lightfield.configuration.scene_blocks import SceneBlocks
 from lightfield.configuration.scene_checks.names import check_folder
 from lightfield.core.names import FILE
 from lightfield.geometry.frames import MOST_VIEWS as MOST_VIEWS_OF_RIG
-from lightfield.geometry.lenses import LENSES, CameraSettings
+from lightfield.geometry.lenses import CameraSettings, Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
+from lightfield.geometry.rigs import Path as PathRig
 from lightfield.geometry.rigs.split_setting import Chosen
 
 FLOW_PLACES = "needs views from two or more places"
@@ -43,7 +44,7 @@ def _check_rig(blocks: SceneBlocks, key: str, name: str, rig: Rig) -> None:
     """Check a rig with its camera, its file and the depth."""
     camera = rig.camera
     if camera is None:
-        raise ValueError(f"{key}: is missing the key camera")
+        raise ValueError(f"{key}: is missing the key camera, or head")
     if isinstance(rig, Poses) and not Path(rig.file).is_file():
         raise ValueError(f"{key}.file: is {rig.file!r}; there is no such file")
     if blocks.scene.blend is None and isinstance(rig, BlendCamera):
@@ -63,14 +64,8 @@ def _check_rig(blocks: SceneBlocks, key: str, name: str, rig: Rig) -> None:
     for view in _unknown_names(rig):
         raise ValueError(f"{key}.split: there is no view {view!r}")
     lens = camera.make()
-    if blocks.render and not lens.in_cycles:
-        lenses = ", ".join(name for name, lens in LENSES.items() if lens.in_cycles)
-        raise ValueError(
-            f"{key}.camera.lens: is {camera.lens!r}, which Cycles does not have; "
-            f"must be one of {lenses} (reproject for the others)"
-        )
     if blocks.render:
-        _check_blender_limits(f"{key}.camera", camera)
+        _check_lens(f"{key}.camera", camera)
     if blocks.render and isinstance(lens, Rectilinear) and not lens.has_square_pixels:
         raise ValueError(
             f"{key}.camera.sensor_size: is {list(lens.sensor)}, but the pixels of Cycles' "
@@ -86,6 +81,13 @@ def _check_rig(blocks: SceneBlocks, key: str, name: str, rig: Rig) -> None:
         raise ValueError(
             f"render.camera_motion: does not go with {key}.cube_map, whose faces would each "
             "move along axes of their own; render panoramas, and reproject with cube_map"
+        )
+    motion = blocks.render and blocks.render.camera_motion
+    lacks_exposure = isinstance(rig, PathRig) and rig.imu and rig.imu.exposure is None
+    if lacks_exposure and motion and motion.rolling is not None:
+        raise ValueError(
+            f"{key}.imu.exposure: is missing; the times of a rolling shutter's rows need the "
+            "seconds of a view's exposure"
         )
     if rig.is_omnidirectional:
         _check_without_centre(blocks, key, name)
@@ -117,11 +119,17 @@ def small_image(resolution: Sequence[int]) -> str | None:
     return f"is {[*resolution]}; must be at least {least} pixels, the smallest image of Blender"
 
 
-def _check_blender_limits(key: str, settings: CameraSettings) -> None:
-    """Refuse a value outside Blender's limits, which Blender would clamp."""
+def _check_lens(key: str, settings: CameraSettings) -> None:
+    """Check that Blender can have the image of a camera, and Cycles its lens, if it is Cycles'."""
     if problem := small_image(settings.resolution):
         raise ValueError(f"{key}.resolution: {problem}")
     lens = settings.make()
+    if lens.in_cycles:
+        _check_blender_limits(key, settings, lens)
+
+
+def _check_blender_limits(key: str, settings: CameraSettings, lens: Lens) -> None:
+    """Refuse a value outside Blender's limits, which Blender would clamp."""
     camera = lens.to_lightfield()["camera"]
     fov = getattr(settings, "fov", None)
     if isinstance(lens, Rectilinear) and lens.focal_length < 1 and fov:

@@ -5,11 +5,12 @@ import pkgutil
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
-from pydantic import ConfigDict, Field, TypeAdapter
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter
 from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
 from lightfield.geometry.lenses.base import LENSES, MOST_PIXELS, Array, Lens, LensSettings, pair
+from lightfield.geometry.lenses.calibration_settings import CalibrationSettings, of_file
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.settings.base import OTHER_NAMES, checked
 
@@ -29,12 +30,18 @@ for _module in pkgutil.iter_modules(__path__):
 OTHER_NAMES.update(
     dict.fromkeys(("perspective", "persp", "pinhole"), "rectilinear")
     | {"fisheye": "equidistant", "opencv_fisheye": "kannala_brandt"}
+    | dict.fromkeys(("ucm", "mei", "omni", "omnidir"), "unified")
+    | dict.fromkeys(("simple_division",), "division")
+    | {"eucm": "extended_unified", "ds": "double_sphere", "ftheta": "f_theta"}
+    | dict.fromkeys(("atan", "fov"), "fov_model")
+    | dict.fromkeys(("radtan", "opencv", "full_opencv"), "brown_conrady")
     | dict.fromkeys(("panorama", "panoramic", "spherical", "latlong"), "equirectangular")
 )
 
-_MODELS: tuple[type[LensSettings], ...] = (
+_MODELS: tuple[type[BaseModel], ...] = (
     *(lens.Settings for lens in LENSES.values() if lens.Settings),
     FileSettings,
+    CalibrationSettings,
 )
 if TYPE_CHECKING:
     CameraSettings = LensSettings
@@ -42,7 +49,11 @@ else:
     # Named, so that the JSON schema has it once.
     CameraSettings = TypeAliasType(
         "CameraSettings",
-        Annotated[Union[_MODELS], Field(discriminator="lens")],  # noqa: UP007
+        Annotated[
+            Union[_MODELS],  # noqa: UP007
+            Field(discriminator="lens"),
+            AfterValidator(of_file),
+        ],
     )
 """A scene YAML's ``camera``: the settings of any lens, which its key ``lens`` chooses."""
 _SETTINGS: TypeAdapter[LensSettings] = TypeAdapter(

@@ -121,7 +121,9 @@ class Lens(ABC):
     - ``title``: its name for people;
     - ``camera_types``: its ``panorama_type`` in lightfield.json, or its ``type`` for a perspective
       camera. The first is written, all are read;
-    - ``in_cycles``: whether Cycles renders it. Reprojection makes views of the others;
+    - ``in_cycles``: whether Cycles has it. A shader renders the others that are `RadialLens`;
+    - ``focuses_on_plane``: whether what is in focus is a plane, as for perspective lenses, or else
+      a sphere around the camera;
     - ``Settings``: its keys in a scene YAML, or None if a scene YAML cannot have it;
     - ``form``: the numbers of its flag, in mm and radians. Numbers in brackets are optional.
     """
@@ -130,6 +132,7 @@ class Lens(ABC):
     title: ClassVar[str]
     camera_types: ClassVar[tuple[str, ...]]
     in_cycles: ClassVar[bool] = False
+    focuses_on_plane: ClassVar[bool] = False
     Settings: ClassVar[type[LensSettings] | None] = None
     form: ClassVar[str | None] = None
 
@@ -196,6 +199,14 @@ class Lens(ABC):
         across = self.rays(np.linspace(0, self.width, 513), y)
         down = self.rays(x, np.linspace(0, self.height, 513))
         return _angle_along(across), _angle_along(down)
+
+    @property
+    def clipped(self) -> str | None:
+        """What part of the image has no ray because the lens's equation ends, for people.
+
+        None if it has none for another reason, such as `fov`, and for lenses without such an end.
+        """
+        return None
 
     @property
     def mirrors(self) -> tuple[bool, bool]:
@@ -358,7 +369,7 @@ class RadialLens(Lens):
         v = (self.center[1] - y) * self._unit[1]
         u, v = self._unbent(u, v)
         r = np.hypot(u, v)
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             sin, cos = self._sin_cos(r)
             # One plane after the other: numpy fills these much faster than vectors.
             ray = np.stack([sin * (u / r), sin * (v / r), -cos])

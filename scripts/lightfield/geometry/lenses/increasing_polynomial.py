@@ -1,61 +1,69 @@
-"""A polynomial on the interval where it increases, and its inverse there."""
+"""Functions on the interval where they increase, and their inverses there."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from lightfield.geometry.lenses.base import Array, slack
 
+# Values that are solved at once. Their arrays stay in the processor's cache.
+BLOCK = 2**14
 
-class IncreasingPolynomial:
-    """Σ c_i t^i on [0, end], where it increases.
 
-    ``end`` is the smallest of three: the first turning point, ``last``, and the t at which the
-    polynomial reaches ``last_value``.
+def first_fall(polynomial: np.polynomial.Polynomial) -> float:
+    """Return the smallest t > 0 at which a polynomial falls below zero, or inf."""
+    roots = np.roots(polynomial.coef[::-1])
+    real = np.sort(roots.real[(np.abs(roots.imag) <= 1e-12 * np.abs(roots)) & (roots.real > 0)])
+    after = np.append((real[:-1] + real[1:]) / 2, real[-1:] * 2)
+    falling = real[polynomial(after) < 0]
+    return float(falling[0]) if falling.size else math.inf
+
+
+class Increasing:
+    """A function that increases on [0, end], and its inverse there.
+
+    ``nodes`` are points from 0 to the end. They bracket every solution, and start Newton's method
+    close to it.
     """
 
     def __init__(
-        self, coefficients: Sequence[float], last: float = math.inf, last_value: float = math.inf
+        self, value: Callable[[Any], Any], slope: Callable[[Any], Any], nodes: Array
     ) -> None:
-        self.value = np.polynomial.Polynomial(coefficients)
-        self.slope = np.polynomial.Polynomial([i * c for i, c in enumerate(coefficients)][1:])
-        self.end = min(self._turning_point(), last)
-        if math.isinf(self.end):
-            self.end = 1.0
-            while self.value(self.end) < last_value:
-                self.end *= 2
-        if self.value(self.end) > last_value > self.value(0.0):
-            # The import takes a quarter of a second, and no other lens needs it.
-            from scipy.optimize import brentq
+        self.value = value
+        self.slope = slope
+        self.end = float(nodes[-1])
+        self._nodes = nodes
+        self._values = np.maximum.accumulate(value(nodes))
 
-            self.end = float(brentq(lambda t: self.value(t) - last_value, 0, self.end, xtol=1e-300))
-        # Nodes that bracket every solution, and start Newton's method close to it.
-        self._nodes = np.linspace(0, self.end, 257)
-        self._values = np.maximum.accumulate(self.value(self._nodes))
-
-    def _turning_point(self) -> float:
-        roots = np.roots(self.slope.coef[::-1])
-        real = np.sort(roots.real[(np.abs(roots.imag) <= 1e-12 * np.abs(roots)) & (roots.real > 0)])
-        after = np.append((real[:-1] + real[1:]) / 2, real[-1:] * 2)
-        falling = real[self.slope(after) < 0]
-        return float(falling[0]) if falling.size else math.inf
+    def guess(self, values: Array) -> Array:
+        """Return about the t in [0, end] with the ``values``."""
+        return np.interp(values, self._values, self._nodes)
 
     def inverse(self, values: Array) -> Array:
-        """Return t in [0, end] with Σ c_i t^i = ``values``, in float64. NaN where no t exists.
+        """Return t in [0, end] with the ``values``, in float64. NaN where no t exists."""
+        goal = values.astype(np.float64).ravel()
+        last = self._values[-1]
+        goal[(goal > last) & (goal <= last * slack(values.dtype))] = last
+        t = np.full(goal.shape, np.nan)
+        solvable = np.flatnonzero((goal >= self._values[0]) & (goal <= last))
+        for first in range(0, solvable.size, BLOCK):
+            block = solvable[first : first + BLOCK]
+            t[block] = self._solved(goal[block])
+        return t.reshape(values.shape)
+
+    def _solved(self, goal: Array) -> Array:
+        """Return t in [0, end] at ``goal`` (n,), which has one.
 
         Newton's method. Bisection keeps it inside a bracket that always contains the solution.
         """
-        last = self._values[-1]
-        goal = values.astype(np.float64).ravel()
-        goal[(goal > last) & (goal <= last * slack(values.dtype))] = last
-        t = np.full(goal.shape, np.nan)
-        active = np.flatnonzero((goal >= self._values[0]) & (goal <= last))
-        goal = goal[active]
+        t = np.empty(goal.shape)
+        active = np.arange(goal.size)
         upper = np.clip(np.searchsorted(self._values, goal), 1, self._nodes.size - 1)
         low = self._nodes[upper - 1]
         high = self._nodes[upper]
-        now = np.interp(goal, self._values, self._nodes)
+        now = self.guess(goal)
         for _ in range(100):
             error = self.value(now) - goal
             low = np.where(error <= 0, now, low)
@@ -71,4 +79,29 @@ class IncreasingPolynomial:
             goal = goal[going]
             now = new[going]
             low, high = low[going], high[going]
-        return t.reshape(values.shape)
+        return t
+
+
+class IncreasingPolynomial(Increasing):
+    """Σ c_i t^i on [0, end], where it increases.
+
+    ``end`` is the smallest of three: the first turning point, ``last``, and the t at which the
+    polynomial reaches ``last_value``.
+    """
+
+    def __init__(
+        self, coefficients: Sequence[float], last: float = math.inf, last_value: float = math.inf
+    ) -> None:
+        value = np.polynomial.Polynomial(coefficients)
+        slope = np.polynomial.Polynomial([i * c for i, c in enumerate(coefficients)][1:])
+        end = min(first_fall(slope), last)
+        if math.isinf(end):
+            end = 1.0
+            while value(end) < last_value:
+                end *= 2
+        if value(end) > last_value > value(0.0):
+            # The import takes a quarter of a second, and no other lens needs it.
+            from scipy.optimize import brentq
+
+            end = float(brentq(lambda t: value(t) - last_value, 0, end, xtol=1e-300))
+        super().__init__(value, slope, np.linspace(0, end, 257))

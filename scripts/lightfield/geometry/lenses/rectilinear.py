@@ -71,6 +71,7 @@ class Rectilinear(RadialLens):
     title = "rectilinear"
     camera_types = ("PERSP",)
     in_cycles = True
+    focuses_on_plane = True
     Settings = RectilinearSettings
     form = "FOCAL_LENGTH,SENSOR_WIDTH"
 

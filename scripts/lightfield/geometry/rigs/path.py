@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from lightfield.core.errors import UserError
+from lightfield.geometry.inertia import Imu, Motion, upright_rates
 from lightfield.geometry.rigs.rig import CountedRig, UnitPoses
 from lightfield.geometry.rotations import Floats, looking_at, matrix_to_euler
 from lightfield.settings.base import Settings, Vector, as_list
@@ -56,6 +57,11 @@ class Path(CountedRig):
     closed: bool = Field(
         False, description="Whether the path continues from the last key back to the first."
     )
+    imu: Imu | None = Field(
+        None,
+        description="Write what an inertial sensor on the camera measures, and when the camera is "
+        "at each view.",
+    )
 
     @model_validator(mode="after")
     def _is_a_path(self) -> Self:
@@ -64,6 +70,8 @@ class Path(CountedRig):
         steps = np.diff(self._places(), axis=0) * self.sides
         if (np.linalg.norm(steps, axis=-1) < 1e-9).any():
             raise ValueError("keys: two consecutive keys have the same position")
+        if self.imu and self.frames:
+            raise ValueError("imu: does not go with frames, which repeat the path in each frame")
         return self
 
     def is_at_one_place(self) -> bool:
@@ -82,11 +90,59 @@ class Path(CountedRig):
             matrices = turns.as_matrix()
         else:
             ahead = spline(where, 1) * self.sides
-            speed = np.linalg.norm(ahead, axis=-1)
-            if speed.min() <= 1e-9 * speed.max():
+            if _turns_back(ahead):
                 raise UserError("keys: the path turns back at a camera; give each key a rotation")
             matrices = looking_at(-ahead, np.zeros(3))
         return UnitPoses.of_sides(("", spline(where), matrix_to_euler(matrices)))
+
+    def view_times(self) -> Floats:
+        """Return the times (count,) in s at which the camera with the `imu` is at each position."""
+        assert self.imu
+        return np.linspace(0, self.imu.seconds, self.count, endpoint=not self.closed)
+
+    def motion(self, times: Floats) -> Motion:
+        """Return the motion of the camera with the `imu` at ``times`` (n,) in s.
+
+        At `view_times` it has the poses of the views. With stereo, it is between the eyes, with
+        cube_map it looks as the face in front, and with a head it is the body's. Raises `UserError`
+        where the path has no direction.
+        """
+        from scipy.interpolate import PchipInterpolator
+        from scipy.spatial.transform import Rotation, Slerp
+
+        assert self.imu
+        spline, fine, length = self._curve()
+        speed = length[-1] / self.imu.seconds
+        along = np.clip(times * speed, 0, length[-1])
+        where = PchipInterpolator(length, fine)(along)
+        ahead = spline(where, 1) * self.sides
+        if _turns_back(ahead):
+            raise UserError("keys: the path turns back, so its imu would measure a collision")
+        metres = np.linalg.norm(ahead, axis=-1, keepdims=True)
+        ahead /= metres
+        bend = spline(where, 2) * self.sides / metres**2
+        # Along itself, a path at constant speed has no acceleration.
+        bend -= ahead * np.sum(ahead * bend, axis=-1, keepdims=True)
+        positions = self.to_world(spline(where))
+        velocities = speed * ahead @ self.turn.T
+        if self.look_at is not None:
+            target = np.array(self.look_at, float)
+            rotations = looking_at(positions, target)
+            rates = upright_rates(rotations, target - positions, -velocities)
+        elif self.keys[0].is_turned:
+            turns = Rotation.from_quat(self._quaternions())
+            at_keys = length[::_PIECES]
+            rotations = self.turn @ Slerp(at_keys, turns)(along).as_matrix()
+            between = (turns[:-1].inv() * turns[1:]).as_rotvec() / np.diff(at_keys)[:, np.newaxis]
+            rates = speed * between[np.searchsorted(at_keys[1:-1], along, side="right")]
+        else:
+            rotations = looking_at(-ahead, np.zeros(3))
+            rates = upright_rates(rotations, ahead, speed * bend)
+            rotations = self.turn @ rotations
+        if self.face_inside:
+            rotations = rotations * np.array([-1.0, 1.0, -1.0])
+            rates = rates * np.array([-1.0, 1.0, -1.0])
+        return Motion(positions, velocities, speed**2 * bend @ self.turn.T, rotations, rates)
 
     def unit_outline(self) -> list[Floats]:
         spline, fine, _ = self._curve()
@@ -131,3 +187,9 @@ class Path(CountedRig):
         )
         pieces = np.linalg.norm(np.diff(spline(fine), axis=0) * self.sides, axis=-1)
         return spline, fine, np.concatenate([[0], np.cumsum(pieces)])
+
+
+def _turns_back(ahead: Floats) -> bool:
+    """Return whether a path's derivative (n, 3) vanishes, so that it has no direction."""
+    speed = np.linalg.norm(ahead, axis=-1)
+    return bool(np.min(speed) <= 1e-9 * np.max(speed))

@@ -11,6 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, model_validator
+from pydantic.json_schema import SkipJsonSchema
 from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
@@ -18,6 +19,7 @@ from lightfield.core.names import Part
 from lightfield.geometry.frames import ONE_PLACE
 from lightfield.geometry.lenses import CameraSettings, build_settings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
+from lightfield.geometry.rigs.mount import HeadCamera, Mount
 from lightfield.geometry.rigs.split_setting import Chosen, Split, part_of
 from lightfield.geometry.rotations import (
     Floats,
@@ -26,7 +28,7 @@ from lightfield.geometry.rotations import (
     matrix_to_euler,
 )
 from lightfield.geometry.spread import spread
-from lightfield.settings.base import FARTHEST, Settings, Vector, as_list
+from lightfield.settings.base import FARTHEST, Name, Settings, Vector, as_list
 
 # Each type of rig contains all lenses.
 build_settings()
@@ -134,7 +136,7 @@ class Stereo(Settings):
 
 
 def _require_camera(schema: dict[str, Any]) -> None:
-    schema["required"] = [*schema.get("required", ()), "camera"]
+    schema["oneOf"] = [{"required": ["camera"]}, {"required": ["head"]}]
 
 
 class Rig(Settings):
@@ -200,10 +202,18 @@ class Rig(Settings):
         "sequence numbers are test views. train, validation or test: all views are. A mapping "
         "selects one of n positions, or views by name.",
     )
-    # Every rig of a scene YAML has a camera. Code that needs only the places may leave it out.
+    # Every rig of a scene YAML has a camera or a head. Code that needs only the places may leave it
+    # out.
     camera: CameraSettings = Field(  # type: ignore[assignment]
-        None, description="Lens and image of each camera."
+        None, description="Lens and image of each camera. Required without head."
     )
+    head: dict[Name, HeadCamera] | None = Field(
+        None,
+        min_length=1,
+        description="In place of camera: cameras with fixed poses on one body, which the rig "
+        "places. Each is a rig of its own, <rig>_<name>, with equal names of views.",
+    )
+    mount: SkipJsonSchema[Mount | None] = None
 
     @model_validator(mode="after")
     def _looks_one_way(self) -> Self:
@@ -211,6 +221,20 @@ class Rig(Settings):
             raise ValueError("look_at: does not go with face_inside or cube_map")
         if self.stereo is not None and self.cube_map:
             raise ValueError("stereo: does not go with cube_map")
+        return self
+
+    @model_validator(mode="after")
+    def _head_is_whole(self) -> Self:
+        if self.head is None:
+            return self
+        if self.camera is not None:
+            raise ValueError("camera: does not go with head, whose cameras have their own")
+        if self.stereo is not None or self.cube_map:
+            key = "cube_map" if self.cube_map else "stereo"
+            raise ValueError(f"{key}: does not go with head; give the head more cameras")
+        if self.is_fitted:
+            key = "size" if self.size == FIT else "center"
+            raise ValueError(f"{key}: fit does not go with head, whose lenses differ; give numbers")
         return self
 
     @model_validator(mode="after")
@@ -265,6 +289,9 @@ class Rig(Settings):
         if self.positions == 1:
             return True
         places = self.to_world(self.unit_poses().positions)
+        if self.mount:
+            # A body that turns at one place moves its cameras.
+            places = np.array([pose.position for pose in self.poses()])
         return bool(np.all(np.ptp(places, axis=0) < ONE_PLACE))
 
     @property
@@ -361,6 +388,11 @@ class Rig(Settings):
             names = [f"{name}_{eye}" for name in names for eye in EYES]
             numbers = np.repeat(numbers, len(EYES))
             rotations = np.repeat(rotations, len(EYES), axis=0)
+        if self.mount:
+            world_from_body = euler_to_matrix(rotations)
+            body_from_camera = self.mount.body_from_camera
+            positions = positions + world_from_body @ body_from_camera[:3, 3]
+            rotations = matrix_to_euler(world_from_body @ body_from_camera[:3, :3])
         tests = self._spread_tests(unit)
         poses = []
         views = zip(names, numbers.tolist(), plain(positions), plain(rotations), strict=True)

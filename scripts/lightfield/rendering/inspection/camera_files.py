@@ -16,7 +16,7 @@ from lightfield.geometry.rigs import fitted
 from lightfield.geometry.rotations import Floats
 from lightfield.rendering.inspection import clearance, light
 from lightfield.rendering.inspection.clearance import REACH
-from lightfield.rendering.inspection.limits import warnings
+from lightfield.rendering.inspection.limits import lens_warnings, warnings
 from lightfield.rendering.scenes import blend_file, frames
 from lightfield.rendering.setup import drawings, viewport
 from lightfield.stages.rig import CheckCameras, FreePlaces
@@ -80,6 +80,7 @@ def write_clearance(job: CheckCameras) -> None:
         *clearance.open_mesh_warnings(enclosures),
         *clearance.dark_room_warnings(enclosures, light.emitters),
         *warnings(positions, distances),
+        *lens_warnings(lightfield.lens),
         *drawings.warnings(camera_type),
     ):
         print(f"warning: {warning}", file=sys.stderr)

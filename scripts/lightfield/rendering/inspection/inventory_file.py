@@ -63,7 +63,7 @@ def write(
     much the scene takes.
     """
     is_own = bool(datasets and datasets[0].source.blend)
-    scene_block = settings.as_json({"scene_name", "view_layers"})
+    scene_block = settings.as_json({"scene_name", "view_layers", "targets"})
     external_files.refuse_damaged_alembic(path)
     with tempfile.NamedTemporaryFile() as printed:
         layers = blend_file.open_scene(path, scene_block, printed=Path(printed.name))

@@ -8,9 +8,11 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
+from lightfield.geometry.lenses import Lens
 from lightfield.geometry.rigs.sphere import icosphere
 from lightfield.rendering.inspection.clearance import REACH
 from lightfield.rendering.inspection.inventory import surface_features
+from lightfield.rendering.scenes.node_trees import contributing
 
 Floats = NDArray[np.float64]
 
@@ -56,6 +58,40 @@ def warnings(positions: Floats, distances: Floats) -> Iterator[str]:
             f"{', '.join(small[:8])}: lights without a size, which do not shine through glass "
             f"({', '.join(glass[:8])}): give them an angle or a radius"
         )
+
+
+def lens_warnings(lens: Lens) -> Iterator[str]:
+    """Yield a line if something shown reads Window coordinates, and a shader renders the lens.
+
+    Through a shader of the camera, Cycles gives these coordinates other values.
+    """
+    names = () if lens.in_cycles else sorted(_readers_of_window())
+    if names:
+        yield (
+            f"{', '.join(names[:8])}: Window texture coordinates are others through the lens "
+            f"{lens.name}, which Cycles lacks; give the shaders other coordinates, or give the rig "
+            "a lens of Cycles"
+        )
+
+
+def _readers_of_window() -> Iterator[str]:
+    """Yield the full names of the shown materials and worlds that read Window coordinates."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    shaders = {bpy.context.scene.world, bpy.context.view_layer.world_override} - {None}
+    for instance in depsgraph.object_instances:
+        slots = instance.object.material_slots
+        shaders |= {slot.material.original for slot in slots if slot.material}
+    for shader in shaders:
+        output = shader.node_tree.get_output_node("CYCLES") if shader.node_tree else None
+        nodes = set(contributing(output)) if output else set()
+        links = [
+            link
+            for node in nodes
+            if node.bl_idname == "ShaderNodeTexCoord"
+            for link in node.outputs["Window"].links
+        ]
+        if any(link.to_node in nodes and not link.is_muted for link in links):
+            yield str(shader.name_full)
 
 
 def _meets_more(limit: int, position: Floats, clear: Collection[str]) -> bool:

@@ -28,7 +28,8 @@ def measure(blend: Path, inventory: Mapping[str, Any], scene_block: Mapping[str,
     ``scene`` block, or empty. Raises `UserError` if the scene does not fit into the machine's
     memory, or cannot be rendered.
     """
-    scene = {key: scene_block[key] for key in ("scene_name", "view_layers") if scene_block.get(key)}
+    keys = ("scene_name", "view_layers", "targets")
+    scene = {key: scene_block[key] for key in keys if scene_block.get(key)}
     with temporary_folder() as folder:
         content = {
             **Equirectangular(width=32, height=16).to_lightfield(),

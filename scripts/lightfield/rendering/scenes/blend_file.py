@@ -13,7 +13,9 @@ import bpy
 from lightfield.core.errors import UserError
 from lightfield.core.files import check_readable
 from lightfield.engine import receipts
+from lightfield.geometry import boards
 from lightfield.rendering.scenes import animation
+from lightfield.rendering.scenes import boards as scene_boards
 from lightfield.rendering.scenes.quiet import quiet, reading_quietly
 
 
@@ -67,8 +69,9 @@ def open_scene(
     """Open a .blend with its scripts disabled. Return the names of the view layers to render.
 
     ``scene_block`` is the block ``scene`` of a scene YAML. Its ``scene_name`` and ``view_layers``
-    choose the scene and its view layers. ``inventory`` lists the files that the .blend reads, which
-    become inputs of the job at work. The file ``printed`` gets what Blender prints.
+    choose the scene and its view layers, and its ``targets`` are added. ``inventory`` lists the
+    files that the .blend reads, which become inputs of the job at work. The file ``printed`` gets
+    what Blender prints.
 
     Raises `UserError` if Blender cannot read the file, or if the scene or a view layer is missing.
     Also raises it if a newer Blender saved the file or a linked library: this one would lose data.
@@ -94,8 +97,11 @@ def open_scene(
                 f"is new in it; build with bpy {newer}, or save it with Blender "
                 f"{bpy.app.version[0]}.{bpy.app.version[1]}"
             )
+    targets = boards.from_settings(scene_block.get("targets") or {}, "targets")
     try:
-        return _choose(scene_block.get("scene_name"), scene_block.get("view_layers"))
+        layers = _choose(scene_block.get("scene_name"), scene_block.get("view_layers"))
+        scene_boards.add(targets)
+        return layers
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lightfield.formats.render_block import CameraMotion
+from lightfield.geometry.lenses.base import RadialLens
 from lightfield.rendering.scenes.ids import Numbers
 from lightfield.rendering.scenes.instances import Instances
 
@@ -19,6 +20,7 @@ class OpenScene:
     - ``namesakes``: the objects that share their names with others, if a pass is a matte.
     - ``volumes``: the full names of the objects that are only volumes.
     - ``motion``: how the camera moves while the shutter is open. None if it stands still.
+    - ``shader_lens``: the lens, if a shader renders it because Cycles lacks it. Else None.
     """
 
     device: str
@@ -27,6 +29,7 @@ class OpenScene:
     namesakes: Sequence[Any]
     volumes: frozenset[str]
     motion: CameraMotion | None
+    shader_lens: RadialLens | None
 
     def names(self, kind: str) -> dict[str, int]:
         """Return the numbers that the pass of a ``kind`` has: object, material or instance."""

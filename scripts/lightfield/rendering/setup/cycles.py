@@ -7,12 +7,14 @@ from typing import Any
 import bpy
 
 from lightfield.core import gpus
-from lightfield.core.errors import OutsideError
+from lightfield.core.errors import OutsideError, UserError
 from lightfield.core.machine import describe
 from lightfield.core.names import FILE
 from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
 from lightfield.formats.passes import AOV_PREFIX, GROUP_PREFIX, Pass
 from lightfield.formats.render_block import RenderBlock
+from lightfield.geometry.lenses import Lens
+from lightfield.geometry.lenses.base import RadialLens
 from lightfield.geometry.rigs.rig import EYES
 from lightfield.planning.cost import TILE_SIDE
 from lightfield.rendering.scenes import (
@@ -28,6 +30,7 @@ from lightfield.rendering.scenes.open_scene import OpenScene
 from lightfield.rendering.setup import (
     drawings,
     followed_camera,
+    lens_shader,
     light_groups,
     motion_blur,
     moving_camera,
@@ -94,8 +97,11 @@ def set_up(
     principled_passes.set_up(view_layer(scene), passes)
     if groups := lightfield.render.emitters_of_groups:
         light_groups.set_up(view_layer(scene), groups)
+    shader_lens = _shader_lens(lightfield)
     _use_device(scene, device)
-    _set_camera(scene, lightfield.content)
+    if shader_lens:
+        _check_shader_device(scene, shader_lens)
+    _set_camera(scene, lightfield.content, shader_lens)
     drawings.set_up(view_layer(scene), scene.camera.data.type, bool(groups))
     _hide_empty_point_clouds()
     shares_names = namesakes.shown() if any(each.kind == "matte" for each in passes) else []
@@ -107,7 +113,7 @@ def set_up(
     if OMNIDIRECTIONAL in lightfield.content:
         _set_eyes(scene, lightfield.content[OMNIDIRECTIONAL])
     if focused:
-        _set_focus(scene.camera.data, focused)
+        _set_focus(scene.camera.data, focused, shader_lens)
     if file_camera and lightfield.follows_views:
         followed_camera.follow_views(file_camera, scene.camera)
     if any(each.kind == "motion" for each in passes):
@@ -123,6 +129,7 @@ def set_up(
         namesakes=shares_names,
         volumes=only_volumes,
         motion=motion,
+        shader_lens=shader_lens,
     )
 
 
@@ -359,10 +366,49 @@ def used_gpus(*kinds: str) -> list[str]:
     return sorted({entry.name for entry in used if not kinds or entry.type in kinds})
 
 
-def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
-    """Set the camera up from the ``camera`` and the sizes in a lightfield.json."""
-    intrinsics = lightfield["camera"]
+def _shader_lens(lightfield: LightField) -> RadialLens | None:
+    """Return the lens if Cycles lacks it, so that a shader renders it. Or None."""
+    lens = lightfield.lens
+    if lens.in_cycles:
+        return None
+    if not isinstance(lens, RadialLens):
+        raise UserError(f"camera: nothing renders a {lens.title}; reproject views of another lens")
+    return lens
+
+
+def _check_shader_device(scene: Any, lens: Lens) -> None:
+    """Raise `UserError` if the device cannot run the shader of a lens."""
+    kind = bpy.context.preferences.addons["cycles"].preferences.compute_device_type
+    if scene.cycles.device == "GPU" and kind != lens_shader.GPU:
+        raise UserError(
+            f"device: {kind.lower()} cannot render the lens {lens.name!r}, which only "
+            f"{lens_shader.GPU.lower()} and cpu can; use one of them, or render an equidistant "
+            "lens and reproject it"
+        )
+
+
+def _set_camera(scene: Any, lightfield: Mapping[str, Any], shader_lens: RadialLens | None) -> None:
+    """Set the camera up from the ``camera`` and the sizes in a lightfield.json.
+
+    A shader makes it see through ``shader_lens``, if there is one.
+    """
     camera = bpy.data.cameras.new(_CAMERA_NAME)
+    # Cycles clips a perspective view at these distances. They must not cut anything away.
+    camera.clip_start = 1e-4
+    camera.clip_end = 1e9
+    if shader_lens:
+        lens_shader.see_through(camera, shader_lens)
+    else:
+        _set_native_lens(camera, lightfield)
+    camera_object = bpy.data.objects.new(_CAMERA_NAME, camera)
+    camera_object.rotation_mode = "XYZ"
+    scene.collection.objects.link(camera_object)
+    scene.camera = camera_object
+
+
+def _set_native_lens(camera: Any, lightfield: Mapping[str, Any]) -> None:
+    """Give a camera a lens of Cycles, from the ``camera`` and the sizes in a lightfield.json."""
+    intrinsics = lightfield["camera"]
     camera.type = intrinsics["type"]
     sensor_width, sensor_height = lightfield["sensor_size"]
     camera.sensor_fit = "HORIZONTAL" if sensor_width >= sensor_height else "VERTICAL"
@@ -377,9 +423,6 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
         x, y = intrinsics["principal_point"]
         camera.shift_x = (width / 2 - x) / across
         camera.shift_y = (y - height / 2) / up
-    # Cycles clips a perspective view at these distances. They must not cut anything away.
-    camera.clip_start = 1e-4
-    camera.clip_end = 1e9
     if intrinsics["type"] == "PERSP":
         camera.lens_unit = "MILLIMETERS"
         camera.lens = intrinsics["focal_length"]
@@ -387,10 +430,6 @@ def _set_camera(scene: Any, lightfield: Mapping[str, Any]) -> None:
         for name, value in intrinsics.items():
             if hasattr(camera, name) and name not in ("type", "lens"):
                 setattr(camera, name, value)
-    camera_object = bpy.data.objects.new(_CAMERA_NAME, camera)
-    camera_object.rotation_mode = "XYZ"
-    scene.collection.objects.link(camera_object)
-    scene.camera = camera_object
 
 
 def _set_eyes(scene: Any, distance: float) -> None:
@@ -418,12 +457,14 @@ def choose_eye(name: str) -> None:
         render.views[eye].use = name.endswith(f"_{eye}")
 
 
-def _set_focus(lens: Any, camera: Any) -> None:
+def _set_focus(lens: Any, camera: Any, shader_lens: RadialLens | None) -> None:
     """Give a camera the aperture and focus of the artist's ``camera`` at the current frame."""
     evaluated = camera.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    if lens.type == "PANO":
+    if lens.type != "PERSP":
         # Cycles uses a panorama's focal length only for the width of the aperture.
         lens.lens = evaluated.lens
+    if shader_lens:
+        lens_shader.set_focal_length(lens, shader_lens, evaluated.lens)
     for name in ("aperture_fstop", "aperture_blades", "aperture_rotation", "aperture_ratio"):
         setattr(lens.dof, name, getattr(evaluated.dof, name))
     lens.dof.focus_object = camera.data.dof.focus_object

@@ -14,7 +14,7 @@ def set_up(layer: Any, camera_type: str, has_light_groups: bool = False) -> None
     Blender draws them in perspective, whatever the lens. It hides them behind surfaces only if the
     view layer has a depth pass. Raises `UserError` for shown drawings with light groups.
     """
-    if camera_type == "PANO":
+    if camera_type != "PERSP":
         layer.use_grease_pencil = False
     elif drawn := _drawings():
         if has_light_groups:
@@ -26,7 +26,7 @@ def set_up(layer: Any, camera_type: str, has_light_groups: bool = False) -> None
 
 
 def warnings(camera_type: str) -> Iterator[str]:
-    """Yield a line if the views of a PANO or PERSP camera lack drawings, or passes of them.
+    """Yield a line if the views of a camera of this type lack drawings, or passes of them.
 
     The viewport must show what is rendered: see `viewport.show_what_is_rendered`.
     """
@@ -34,7 +34,7 @@ def warnings(camera_type: str) -> Iterator[str]:
     if not shown:
         return
     names = f"{', '.join(shown[:8])}{' …' if len(shown) > 8 else ''}"
-    if camera_type == "PANO":
+    if camera_type != "PERSP":
         yield (
             f"Grease Pencil is left out: {names}: Blender draws it through perspective lenses "
             "alone; give the rig a rectilinear lens, or make the drawing a mesh"

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from lightfield.formats import passes
+from lightfield.geometry.lenses import Lens
 from lightfield.imaging.images import LEAST_ALPHA
 from lightfield.rendering.scenes import instances, volumes
 from lightfield.rendering.scenes.open_scene import OpenScene
@@ -118,10 +119,31 @@ def _pass(opened: OpenScene, name: str, cycles_passes: Mapping[str, Array], hit:
     pixels = cycles_passes[cycles_name]
     if name == "motion":
         pixels = pixels * _MOTION_SIGNS
+        if opened.shader_lens:
+            pixels = _motion_in_pixels(pixels, opened.shader_lens)
     pixels = np.where(hit, pixels, np.float32(0))
     if name in ("object", "material"):
         return opened.numbers[name].of_index[pixels[..., 0].astype(np.uint16)]
     return pixels
+
+
+def _motion_in_pixels(motion: Array, lens: Lens) -> Array:
+    """Return the motion (height, width, 4) that Cycles has of a shader's lens, in pixels.
+
+    Through a shader, Cycles has the differences of unit rays in x and y. It does not tell on which
+    side of the camera's plane a surface was, so this takes the side of the pixel. 0 where the lens
+    does not see the place.
+    """
+    rays = lens.pixel_rays()
+    pixels = lens.pixels(rays)
+    places = []
+    for offset in (motion[..., :2], motion[..., 2:]):
+        x = rays[..., 0] + offset[..., 0]
+        y = rays[..., 1] - offset[..., 1]
+        depth = np.sqrt(np.maximum(1 - x**2 - y**2, 0))
+        z = np.copysign(depth, rays[..., 2])
+        places.append(lens.pixels(np.stack([x, y, z], axis=-1)) - pixels)
+    return np.asarray(np.nan_to_num(np.concatenate(places, axis=-1), nan=0), np.float32)
 
 
 @contextmanager

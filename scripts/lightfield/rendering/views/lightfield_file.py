@@ -8,9 +8,9 @@ from typing import Any
 from lightfield.configuration.capture import LightfieldSettings, panorama_rig
 from lightfield.core import machine
 from lightfield.core.errors import UserError
-from lightfield.core.names import FILE
+from lightfield.core.names import FILE, IMU
 from lightfield.engine.read_files import changed_since_plan, check_since_plan
-from lightfield.formats import blend, light_groups, published
+from lightfield.formats import blend, imu, light_groups, published
 from lightfield.formats.inventory import read_inventory
 from lightfield.formats.lightfield import MACHINE, RIG_FIT, LightField
 from lightfield.formats.render_block import RenderBlock
@@ -36,6 +36,13 @@ def write(job: MakeLightfield) -> None:
     if settings.fingerprint not in (None, lightfield.scene["fingerprint"]):
         source = settings.source
         raise changed_since_plan(source.dataset or f"the builder {source.builder}")
+    if IMU in lightfield.content:
+        assert isinstance(settings.rig, rigs.Path)
+        imu.write(job.output.parent, settings.rig, lightfield)
+        motion = lightfield.render.camera_motion
+        # The camera_motion of a camera on a head is in the camera's axes, not in the body's.
+        if motion and settings.rig.imu and settings.rig.imu.exposure and not settings.rig.mount:
+            print(f"note: {imu.exposure_note(settings.rig, motion)}")
     lightfield.write(job.output)
 
 
@@ -84,6 +91,8 @@ def from_settings(
             print(f"note: {capture.rig.file}: is imported without {', '.join(unused_keys)}")
     else:
         keys[MACHINE] = machine.describe(capture.render.denoise)
+    if isinstance(capture.rig, rigs.Path) and capture.rig.imu:
+        keys[IMU] = imu.settings_content(capture.rig.imu)
     if settings.file_look:
         keys[FILE_LOOK] = _file_look(capture.source.blend, inventory)
     lightfield = LightField.from_rig(capture.rig, capture.rig.camera.make(), **keys)
