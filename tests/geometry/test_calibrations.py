@@ -382,12 +382,13 @@ def test_a_damaged_file_names_its_key(tmp_path, name, content, message):
     assert message in str(error.value)
 
 
-def scene(tmp_path, monkeypatch, camera, name="own"):
+def scene(tmp_path, monkeypatch, camera, name="own", **blocks):
     """Write a scene YAML whose rig has a camera, and return the rig's dataset."""
     content = {
         "scene": {"builder": "rooms"},
         "rigs": {"wall": {"type": "plane", "cameras": [2, 2], "baseline": 0.1, "camera": camera}},
         "render": {"samples": 4},
+        **blocks,
     }
     (tmp_path / f"{name}.yaml").write_text(json.dumps(content))
     monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
@@ -422,3 +423,13 @@ def test_a_lens_ends_at_its_fov():
     axis_angles = np.radians([84, 86])
     rays = np.stack([np.sin(axis_angles), np.zeros(2), -np.cos(axis_angles)], -1)
     assert np.isfinite(lens.pixels(rays)[:, 0]).tolist() == [True, False]
+
+
+def test_views_can_be_resampled_through_a_calibration(tmp_path, monkeypatch):
+    around = {"lens": "equirectangular", "resolution": [64, 32]}
+    euroc = {"camera": {"lens": "calibrated", "file": str(EUROC)}}
+    dataset = scene(tmp_path, monkeypatch, around, reprojections={"euroc": euroc})
+    lens = dataset.reprojections["euroc"].camera.make()
+    directions = points(35)
+    truth = opencv_pixels(directions, EUROC_K, EUROC_D)
+    np.testing.assert_allclose(seen(lens, directions), truth, rtol=0, atol=1e-9)
