@@ -1,8 +1,8 @@
 """Makes Gaussians of the surfaces that views see, without training.
 
 Each surface point gets one Gaussian, from the view that sees it best. A Gaussian is as large as its
-pixel's footprint on the surface, and lies flat on it. Its colour is half the colour of that view,
-and half the mean of the other views that see the point.
+pixel's footprint on the surface, and lies flat on it. Its colour is a mean over the views that see
+the point.
 
 With the rays r, their change from pixel to pixel r_u and r_v, the surface's normal n and its
 distance d, the footprint is spanned by a_u = d (r_u − r (r_u·n) / (r·n)), and likewise a_v. The
@@ -22,7 +22,7 @@ from lightfield.export.trainer_splits import splits
 from lightfield.formats.gaussians import Gaussians, harmonics_of
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
-from lightfield.geometry.visibility import ONE_SURFACE, lies_on, pixel_indices
+from lightfield.geometry.visibility import ONE_SURFACE, lies_on
 
 Singles = NDArray[np.float32]
 
@@ -43,8 +43,8 @@ _LEAST_COSINE = 0.2
 _OWNS = 1.05
 # Pixels beside a tear own a point only if no other view sees it well.
 _TORN_SCORE = 100.0
-# A point lies on the surface that another view sees within this part of the distance. Beside it, a
-# slanted surface passes through the point if its distances there differ by less than the second.
+# Another view sees a point if its surface is there, within the first part of the distance. Or the
+# point lies between two of its pixels whose distances differ by less than the second part.
 _ON_SURFACE = 0.003
 _SLANTED = 0.03
 # Neighbours share a surface if their inverse distances differ by less than this part, or as much as
@@ -75,11 +75,11 @@ class _Grid:
         y = self.rows + 0.5 + below
         return np.asarray(self.lens.rays(x[None, :], y[:, None]))
 
-    def of(self, image: NDArray[np.generic], right: int = 0, below: int = 0) -> NDArray[np.generic]:
+    def of(self, image: Floats, right: int = 0, below: int = 0) -> Floats:
         """Return an image's values at the pixels, or at pixels beside them. Repeats its edges."""
         row = (self.rows + below).clip(0, self.lens.height - 1)
         column = (self.columns + right).clip(0, self.lens.width - 1)
-        return image[np.ix_(row, column)]
+        return np.asarray(image[np.ix_(row, column)])
 
 
 @dataclass(frozen=True)
@@ -115,8 +115,8 @@ def _owned(source: SourceDataset, views: Sequence[View], grid: _Grid) -> Gaussia
     for view in views:
         seen.append(_samples(source, view, grid, rays))
         progress.done()
-    finite = [each.distance[np.isfinite(each.distance)] for each in seen]
-    sky = _SKY * max((float(part.max()) for part in finite if part.size), default=1.0)
+    farthest = [np.max(each.distance, initial=0, where=np.isfinite(each.distance)) for each in seen]
+    sky = _SKY * (float(max(farthest)) or 1.0)
     parts = []
     for samples in seen:
         parts.append(_gaussians(samples, seen, grid, rays, sky))
@@ -150,11 +150,10 @@ def _colours(
     source: SourceDataset, view: View, grid: _Grid, image: Floats, distance: Floats
 ) -> tuple[Singles, Singles]:
     """Return colours (h, w, 3) and coverage (h, w), 0 to 1: means of the pixels on one surface."""
-    encoded = source.encoded(view)
     coverage = source.alpha(view) / 255
-    encoded = encoded / np.where(coverage > 0, coverage, 1)[..., None] if source.lightfield.transparent else encoded
-    sums = np.zeros((*distance.shape, 3))
-    covered = np.zeros(distance.shape)
+    # Transparent views are encoded in front of black.
+    encoded = np.nan_to_num(source.encoded(view)) / np.where(coverage > 0, coverage, 1)[..., None]
+    sums = np.zeros((*distance.shape, 4))
     weights = np.zeros(distance.shape)
     side = max(1, round(grid.step))
     offsets = range(-(side // 2), side - side // 2)
@@ -162,11 +161,11 @@ def _colours(
         for right in offsets:
             there = grid.of(image, right, below)
             weight = lies_on(there, distance, part=ONE_SURFACE) | (there == distance)
-            sums += weight[..., None] * np.nan_to_num(grid.of(encoded, right, below))
-            covered += weight * grid.of(coverage, right, below)
             weights += weight
-    weights = np.maximum(weights, 1)
-    return (sums / weights[..., None]).astype(np.float32), (covered / weights).astype(np.float32)
+            sums[..., :3] += weight[..., None] * grid.of(encoded, right, below)
+            sums[..., 3] += weight * grid.of(coverage, right, below)
+    means = (sums / np.maximum(weights, 1)[..., None]).astype(np.float32)
+    return means[..., :3], means[..., 3]
 
 
 def _normals(grid: _Grid, image: Floats, rays: Floats) -> Floats:
@@ -190,7 +189,7 @@ def _normals(grid: _Grid, image: Floats, rays: Floats) -> Floats:
         along /= np.linalg.norm(along, axis=-1, keepdims=True)
         least = _LEAST_COSINE
         turned = math.sqrt(1 - least**2) * along - least * rays
-    return np.where(cosine < least, turned, normal)
+    return np.asarray(np.where(cosine < least, turned, normal))
 
 
 def _nearer(grid: _Grid, image: Floats, here: Floats, way: tuple[int, int]) -> Floats:
@@ -200,7 +199,7 @@ def _nearer(grid: _Grid, image: Floats, here: Floats, way: tuple[int, int]) -> F
     before = here - grid.rays(-right, -below) * grid.of(image, -right, -below)[..., None]
     lengths = [np.linalg.norm(each, axis=-1, keepdims=True) for each in (after, before)]
     far_after, far_before = (np.where(np.isnan(each), np.inf, each) for each in lengths)
-    return np.where(far_after <= far_before, after, before)
+    return np.asarray(np.where(far_after <= far_before, after, before))
 
 
 def _torn(distance: Floats) -> Bools:
@@ -228,50 +227,60 @@ def _scores(rays: Floats, distance: Floats, normal: Floats, torn: Bools) -> Floa
     cosine = np.abs((normal * rays).sum(axis=-1))
     angle = np.arccos((-rays[..., 2]).clip(-1, 1)) / (math.pi / 2)
     away = np.where(np.isinf(distance), 1.0, distance)
-    return away**2 / cosine * (1 + 0.5 * angle**2) * np.where(torn, _TORN_SCORE, 1.0)
+    scores: Floats = away**2 / cosine * (1 + 0.5 * angle**2) * np.where(torn, _TORN_SCORE, 1.0)
+    return scores
 
 
 def _gaussians(
     samples: _Samples, seen: Sequence[_Samples], grid: _Grid, rays: Floats, sky: float
 ) -> Gaussians:
     """Return the Gaussians of one view's pixels that own their points."""
-    turn = samples.view.world_from_camera[:3, :3].T
-    places = np.flatnonzero(np.isfinite(samples.score))
-    distance = samples.distance.ravel()[places].astype(np.float64)
+    pixels = np.flatnonzero(np.isfinite(samples.score))
+    distance = samples.distance.ravel()[pixels].astype(np.float64)
     is_sky = np.isinf(distance)
     distance[is_sky] = sky
-    local = rays.reshape(-1, 3)[places] * distance[:, None]
-    positions = local @ turn + samples.view.world_from_camera[:3, 3]
-    score = samples.score.ravel()[places].astype(np.float64)
-    colours = np.zeros((len(places), 3))
-    weights = np.zeros(len(places))
-    owned = np.arange(len(places))
-    for other in seen:
-        if other is samples:
-            continue
-        column, row, is_on = _where_seen(other, grid, positions[owned], is_sky[owned])
-        other_score = other.score[row, column]
-        loses = is_on & (other_score * _OWNS < score[owned])
-        sees = is_on & np.isfinite(other_score)
-        weight = np.where(sees, 1 / other_score, 0)
-        colours[owned] += weight[:, None] * other.colour[row, column]
-        weights[owned] += weight
-        owned = owned[~loses]
-    pixels = places[owned]
-    own = samples.colour.reshape(-1, 3)[pixels]
-    w = 0.5 * weights[owned] / (1 / score[owned] + 0.5 * weights[owned])
-    mean = colours[owned] / np.maximum(weights[owned], 1e-30)[:, None]
-    torn = samples.torn.ravel()[pixels]
+    turn = samples.view.world_from_camera[:3, :3]
+    local = rays.reshape(-1, 3)[pixels] * distance[:, None]
+    positions = local @ turn.T + samples.view.world_from_camera[:3, 3]
+    others = [other for other in seen if other is not samples]
+    owned, colours = _shared_colours(samples, others, grid, pixels, positions, is_sky)
+    torn = samples.torn.ravel()[pixels[owned]]
     sigma = np.where(is_sky[owned], _SKY_SIGMA, np.where(torn, _TORN_SIGMA, _SIGMA))
-    scales, axes = _axes(grid, rays, samples, pixels, distance[owned], sigma)
-    opacity = np.where(torn, _TORN_OPACITY, _OPACITY) * samples.alpha.ravel()[pixels]
+    scales, axes = _axes(grid, rays, samples, pixels[owned], distance[owned], sigma)
+    opacity = np.where(torn, _TORN_OPACITY, _OPACITY)
     return Gaussians(
         positions[owned],
         scales,
-        _quaternions(turn.T @ axes),
-        harmonics_of(own * (1 - w)[:, None] + mean * w[:, None]),
-        opacity,
+        _quaternions(turn @ axes),
+        harmonics_of(colours),
+        opacity * samples.alpha.ravel()[pixels[owned]],
     )
+
+
+def _shared_colours(
+    samples: _Samples,
+    others: Sequence[_Samples],
+    grid: _Grid,
+    pixels: NDArray[np.intp],
+    positions: Floats,
+    is_sky: Bools,
+) -> tuple[NDArray[np.intp], Floats]:
+    """Return which of a view's points (n, 3) no other view sees better, and their colours (m, 3).
+
+    The views that see a point count by how well they see it, and half if they do not own it.
+    """
+    score = samples.score.ravel()[pixels].astype(np.float64)
+    weights = 1 / score
+    sums = weights[:, None] * samples.colour.reshape(-1, 3)[pixels]
+    owned = np.arange(len(pixels))
+    for other in others:
+        column, row, sees = _where_seen(other, grid, positions[owned], is_sky[owned])
+        other_score = other.score[row, column]
+        weight = np.where(sees, 0.5 / other_score, 0)
+        weights[owned] += weight
+        sums[owned] += weight[:, None] * other.colour[row, column]
+        owned = owned[~sees | (other_score * _OWNS >= score[owned])]
+    return owned, (sums / weights[:, None])[owned]
 
 
 def _where_seen(

@@ -50,7 +50,8 @@ class Gaussians:
 
 def harmonics_of(colours: Floats) -> Floats:
     """Return the harmonics (n, 1, 3) of sRGB-encoded ``colours`` (n, 3), 0 to 1."""
-    return ((colours - GREY) / HARMONIC_0)[:, np.newaxis]
+    harmonics: Floats = (colours - GREY) / HARMONIC_0
+    return harmonics[:, np.newaxis]
 
 
 def _names(harmonics: int) -> list[str]:
@@ -99,13 +100,14 @@ def read(path: Path) -> Gaussians:
                 "floats alone; export it as 3D Gaussian splatting writes it"
             )
         file.seek(len(header) + len(end))
-        values = np.frombuffer(file.read(4 * count * len(names)), "<f4")
+        values = file.read(4 * count * len(names))
     missing = [name for name in _names(1) if name not in names and not name.startswith("n")]
     if missing:
         raise UserError(f"{path}: has no {missing[0]}; a splat's PLY must have it")
-    if values.size != count * len(names):
+    if len(values) != 4 * count * len(names):
         raise UserError(f"{path}: is cut off: it must have {count} vertices")
-    by_name = dict(zip(names, values.reshape(count, -1).T.astype(np.float64), strict=True))
+    columns = np.frombuffer(values, "<f4").reshape(count, -1).T.astype(np.float64)
+    by_name = dict(zip(names, columns, strict=True))
     harmonics = 1 + sum(name.startswith("f_rest_") for name in names) // 3
     if harmonics not in _HARMONICS:
         raise UserError(f"{path}: has {harmonics - 1} f_rest a colour; must be 0, 3, 8 or 15")
@@ -125,7 +127,9 @@ def _vertices(lines: list[str]) -> tuple[int | None, list[str]]:
     words = [line.split() for line in lines[2:] if not line.startswith(("comment", "obj_info"))]
     if not words or words[0][:2] != ["element", "vertex"] or not words[0][2:3]:
         return None, []
-    properties = [line[2] for line in words[1:] if len(line) == 3 and line[:2] == ["property", "float"]]
+    properties = [
+        line[2] for line in words[1:] if len(line) == 3 and line[:2] == ["property", "float"]
+    ]
     count = words[0][2]
     if len(properties) != len(words) - 1 or not count.isdecimal():
         return None, []
@@ -146,5 +150,5 @@ def _stacked(by_name: dict[str, Floats], *names: str) -> Floats:
 
 def _unit(vectors: Floats) -> Floats:
     """Return vectors (n, k) of length 1. Trainers do not normalise their quaternions."""
-    length: Floats = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.maximum(length, 1e-12)
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.asarray(vectors / np.maximum(length, 1e-12))

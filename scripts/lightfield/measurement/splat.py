@@ -28,19 +28,21 @@ _COVERED = 0.5
 
 @dataclass(frozen=True)
 class Drawn:
-    """A drawn view: sRGB-encoded colour (h, w, 3), coverage (h, w), and distance or Z (h, w)."""
+    """A drawn view over black.
+
+    - ``colour``: sRGB-encoded, (h, w, 3).
+    - ``coverage``: the part (h, w) of each pixel that Gaussians cover.
+    - ``distance``: the mean of their distances (h, w) in metres, weighted by what they add to the
+      pixel. inf where they cover less than half of it.
+    """
 
     colour: Floats
     coverage: Floats
-    depth: Floats
+    distance: Floats
 
 
-def draw(gaussians: Gaussians, view: View, lens: Lens, depth: str = "distance") -> Drawn:
-    """Return what a ``view`` shows through a ``lens``, over black.
-
-    ``depth`` is "z" or "distance". It is the mean of the Gaussians' own, weighted by what they add
-    to a pixel. It is inf where they cover less than half of the pixel.
-    """
+def draw(gaussians: Gaussians, view: View, lens: Lens) -> Drawn:
+    """Return what a ``view`` shows through a ``lens``."""
     local = view.to_camera(gaussians.positions)
     away = np.linalg.norm(local, axis=1)
     along = -local[:, 2] if isinstance(lens, Rectilinear) else away
@@ -56,14 +58,13 @@ def draw(gaussians: Gaussians, view: View, lens: Lens, depth: str = "distance") 
     order = np.argsort(along[visible], kind="stable")
     offset = gaussians.positions[visible] - view.world_from_camera[:3, 3]
     shades = _colours(gaussians.harmonics[visible], offset)
-    metres = -local[:, 2] if depth == "z" else away[visible]
     drawn = np.zeros((lens.height, lens.width, 4))
     transmitted = np.ones((lens.height, lens.width))
     opaque = np.zeros((lens.height, lens.width), bool)
     _blend(
         lens.pixels(local)[order],
         covariance[order],
-        np.column_stack([shades, metres])[order],
+        np.column_stack([shades, away[visible]])[order],
         gaussians.opacities[visible][order],
         drawn,
         transmitted,
@@ -158,7 +159,7 @@ def _blend(
 ) -> None:
     """Add Gaussians to ``drawn`` (h, w, 4), from the nearest on.
 
-    ``values`` (n, 4) are colours and depths. ``transmitted`` (h, w) is the part of the light that
+    ``values`` (n, 4) are colours and distances. ``transmitted`` (h, w) is the part of the light that
     passes through. A pixel is ``opaque`` (h, w) before less than 1e-4 passes. A Gaussian that
     covers less than 1 / 255 is left out.
     """
@@ -171,12 +172,12 @@ def _blend(
         determinant = a * c - b * b
         if not determinant > 0:
             continue
-        middle = (a + c) / 2
-        reach = math.ceil(3.0 * math.sqrt(middle + math.sqrt(max(0.01, middle**2 - determinant))))
-        first_row = max(0, math.floor(y - reach))
-        last_row = min(height, math.ceil(y + reach))
-        first_column = max(0, math.floor(x - reach))
-        last_column = min(width, math.ceil(x + reach))
+        # Beyond this many standard deviations, it covers less than 1 / 255.
+        reach = math.sqrt(2 * math.log(max(255 * opacities[n], 1.0)))
+        first_row = max(0, math.floor(y - reach * math.sqrt(c)))
+        last_row = min(height, math.ceil(y + reach * math.sqrt(c)))
+        first_column = max(0, math.floor(x - reach * math.sqrt(a)))
+        last_column = min(width, math.ceil(x + reach * math.sqrt(a)))
         for i in range(first_row, last_row):
             v = i + 0.5 - y
             for j in range(first_column, last_column):
