@@ -1054,6 +1054,8 @@ def test_cycles_lenses_exist_as_blenders_cameras() -> None:
         ({"sensor_size": (36, 0)}, "must be positive millimetres"),
         ({"sensor_size": (math.inf, 1)}, "must be positive millimetres"),
         ({"principal_point": (math.nan, 1)}, "must be finite pixels"),
+        # An image of twice the size would have no finite one.
+        ({"principal_point": (1, 1e308)}, "must be finite pixels, below 1e99"),
     ],
 )
 def test_every_lens_refuses_an_invalid_image(
