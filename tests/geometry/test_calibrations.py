@@ -363,6 +363,8 @@ def test_frames_with_cameras_of_their_own_are_chosen_by_their_files(tmp_path):
         ("a.json", '{"fl_x": 5, "w": 4, "h": 4, "camera_model": "X"}', "camera_model: is 'X'"),
         ("a.json", '{"camera_angle_x": 5, "w": 4, "h": 4}', "camera_angle_x: is 5; must be an"),
         ("a.json", '{"fl_x": NaN, "w": 4, "h": 4}', "fl_x: has nan; must be finite"),
+        ("a.json", f'{{"fl_x": {"9" * 400}, "w": 4, "h": 4}}', "fl_x: has 9999"),
+        ("a.json", f'{{"K": {"[" * 500}{"]" * 500}}}', "K: has [[[["),
         ("a.txt", "1 FISHBOWL 4 4 1 2\n", "camera 1: MODEL: is FISHBOWL; must be one of SIMPLE_P"),
         ("a.txt", "1 PINHOLE 4 4 1 2\n", "camera 1: PINHOLE: has 2 numbers; must have 4"),
         ("a.txt", "1 PINHOLE 4 4 1 2 x 4\n", "camera 1: PINHOLE: has 'x'; must be finite numbers"),

@@ -232,7 +232,9 @@ class Lens(ABC):
         NaN where the lens does not see the ray. Coordinates may lie outside the frame.
         """
         (array,) = _as_float(rays)
-        pixels = self._pixels(np.atleast_2d(array)).astype(array.dtype, copy=False)
+        # A coordinate beyond float32 becomes infinite: a miss.
+        with np.errstate(over="ignore"):
+            pixels = self._pixels(np.atleast_2d(array)).astype(array.dtype, copy=False)
         missed = ~np.isfinite(pixels[..., 0] + pixels[..., 1])
         if missed.any():
             pixels[missed] = np.nan
