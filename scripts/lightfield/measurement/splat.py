@@ -159,9 +159,9 @@ def _blend(
 ) -> None:
     """Add Gaussians to ``drawn`` (h, w, 4), from the nearest on.
 
-    ``values`` (n, 4) are colours and distances. ``transmitted`` (h, w) is the part of the light that
-    passes through. A pixel is ``opaque`` (h, w) before less than 1e-4 passes. A Gaussian that
-    covers less than 1 / 255 is left out.
+    ``values`` (n, 4) are colours and distances. ``transmitted`` (h, w) is the part of the light
+    that passes through. A pixel is ``opaque`` (h, w) before less than 1e-4 passes. A Gaussian is
+    left out where it covers less than 1 / 255.
     """
     height, width = transmitted.shape
     for n in range(len(pixels)):
