@@ -586,6 +586,7 @@ REFUSED = [
             ("ncore", "points", 0),
             ("lichtfeld", "format", "jpg"),
             ("lichtfeld", "normals", 1),
+            ("wai", "exposure", 101),
         )
     ),
     *(("flow", value) for value in (True, {"pairs": "all"}, {}, [])),

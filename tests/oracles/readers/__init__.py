@@ -42,6 +42,7 @@ from oracles.readers import (
     scannetpp,
     scene_flow,
     splat,
+    wai,
 )
 from oracles.readers.contents import Exported
 
@@ -60,6 +61,7 @@ READERS = {
     "poses_csv": poses_csv.read,
     "scannetpp": scannetpp.read,
     "splat": splat.read,
+    "wai": wai.read,
 }
 
 WITHOUT_VIEWS = ("coco", "mesh", "point_cloud", "splat")
