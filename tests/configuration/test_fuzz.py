@@ -190,6 +190,12 @@ CAMERAS = {
     "rectilinear": {"fov": 60, "principal_point": [7, 9]},
     "kannala_brandt": {"fov": 120, "focal_length": 10, "coefficients": [0.01, 0, 0, 0]},
     "polynomial": {"fov": 120, "coefficients": [0, -0.1, 0, 0, 0]},
+    "division": {"focal_length": 10, "coefficients": [-0.3]},
+    "fov_model": {"focal_length": 10, "coefficients": [0.9]},
+    "unified": {"focal_length": 20, "coefficients": [0.9]},
+    "extended_unified": {"focal_length": 10, "coefficients": [0.6, 1.1]},
+    "double_sphere": {"focal_length": 10, "coefficients": [-0.2, 0.6]},
+    "f_theta": {"focal_length": 10, "coefficients": [0.01, 0, 0, -0.01]},
     "brown_conrady": {"focal_length": 20, "coefficients": [-0.2, 0.1, 0.001, 0.002]},
 }
 PLANE = {"type": "plane", "cameras": [2, 2]}

@@ -5,6 +5,7 @@ The scene is the inside of a sphere, so all its points are known.
 
 import math
 
+import cv2
 import numpy as np
 import pycolmap
 import pytest
@@ -353,3 +354,24 @@ def test_a_division_lens_beyond_180_degrees_is_colmaps(tmp_path):
 def test_a_model_that_trainers_do_not_read_is_a_warning(tmp_path, capsys, model, programs):
     written(tmp_path, CALIBRATED[model])
     assert f"camera: is COLMAP's {model}, which {programs}" in capsys.readouterr().err
+
+
+def test_gsplats_half_pixel_is_a_warning_because_it_moves_eurocs_pixels(tmp_path, capsys):
+    """gsplat gives COLMAP's principal point to OpenCV, whose pixels' centres are whole numbers."""
+    camera = {
+        "lens": "brown_conrady",
+        "focal_length": 21.96,
+        "coefficients": [-0.2834, 0.074, 0.0002, 2e-5],
+        "resolution": [75, 48],
+    }
+    found, _ = written(tmp_path, camera)
+    assert "camera: gsplat undistorts it as if the first" in capsys.readouterr().err
+    # As in gsplat's examples/datasets/colmap.py.
+    matrix, distortion, size = found.calibration_matrix(), found.params[4:8], (75, 48)
+    flat, _ = cv2.getOptimalNewCameraMatrix(matrix, distortion, size, 0)
+    columns, rows = cv2.initUndistortRectifyMap(matrix, distortion, None, flat, size, cv2.CV_32FC1)
+    shown = found.cam_from_img(np.stack([columns, rows], -1).reshape(-1, 2).astype(float) + 0.5)
+    taken = shown @ flat[:2, :2].T + flat[:2, 2]
+    row, column = np.mgrid[:48, :75] + 0.5
+    moved = np.linalg.norm(taken - np.stack([column, row], -1).reshape(-1, 2), axis=-1)
+    assert 0.3 < moved.max() < 0.6

@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
+import pycolmap
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from sphere import CALIBRATED, look_at_ball, write_views
@@ -141,13 +141,12 @@ class Loader:
 
     def undistorted(self, across: float, down: float) -> Any:
         """Return the tangents of OpenCV's point at this many pixels from the principal point."""
-        matrix = np.diag([self.json["fl_x"], self.json["fl_y"], 1])
         # The loader puts k3 and k4 where p1 and p2 are.
         assert not {"k3", "k4"} & {*self.json}
-        distortion = np.array([self.json[key] for key in ("k1", "k2", "p1", "p2")])
-        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-12)
-        point = np.array([[[across, down]]], float)
-        return cv2.undistortPoints(point, matrix, distortion, criteria=criteria)[0, 0]
+        parameters = [self.json["fl_x"], self.json["fl_y"], 0, 0]
+        parameters += [self.json[key] for key in ("k1", "k2", "p1", "p2")]
+        camera = pycolmap.Camera(model="OPENCV", width=64, height=48, params=parameters)
+        return camera.cam_from_img(np.array([float(across), float(down)]))
 
 
 def silvr_orientation(point: Any) -> list[float]:

@@ -110,21 +110,16 @@ def nerfstudio_rays(content):
     """Return directions in the camera's frame, as nerfstudio's Cameras.generate_rays does."""
     y, x = np.mgrid[: content["h"], : content["w"]] + 0.5
     x, y = (x - content["cx"]) / content["fl_x"], -(y - content["cy"]) / content["fl_y"]
-    if content["camera_model"] == "OPENCV":
-        distortion = [content.get(key, 0.0) for key in ("k1", "k2", "p1", "p2", "k3")]
-        assert not content.get("k4", 0)
-        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-12)
-        points = np.stack([x, -y], axis=-1).reshape(-1, 1, 2)
-        flat = cv2.undistortPoints(points, np.eye(3), np.array(distortion), criteria=criteria)
-        x, y = np.moveaxis(flat.reshape(*x.shape, 2), -1, 0)
-        return np.stack([x, -y, -np.ones_like(x)], axis=-1)
-    if content["camera_model"] == "FISHEYE624":
+    if content["camera_model"] in ("OPENCV", "FISHEYE624"):
+        # Their rays have length 1 along the axis.
+        model, distortion = "RAD_TAN_THIN_PRISM_FISHEYE", content.get("distortion_params")
+        if content["camera_model"] == "OPENCV":
+            assert not content.get("k4", 0)
+            names = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+            model, distortion = "FULL_OPENCV", [content.get(name, 0.0) for name in names]
         parameters = [content[key] for key in ("fl_x", "fl_y", "cx", "cy")]
         camera = pycolmap.Camera(
-            model="RAD_TAN_THIN_PRISM_FISHEYE",
-            width=content["w"],
-            height=content["h"],
-            params=[*parameters, *content["distortion_params"]],
+            model=model, width=content["w"], height=content["h"], params=[*parameters, *distortion]
         )
         centres = np.mgrid[: content["h"], : content["w"]][::-1].reshape(2, -1).T + 0.5
         flat = camera.cam_from_img(centres).reshape(*x.shape, 2)

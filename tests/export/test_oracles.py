@@ -51,7 +51,7 @@ SETS = {
 }
 # The exports of each set; "views" are the rendered ones.
 EXPORTS = {
-    "views": {"opendibr": {}, "point_cloud": {"voxel": 0.1}},
+    "views": {"opendibr": {}, "point_cloud": {"voxel": 0.1}, "splat": {"gaussians": 500}},
     "perspective": {
         "colmap": {"format": "text", "points": 60, "depth": True},
         "nerfstudio": {"points": 60, "depth": True},

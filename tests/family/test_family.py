@@ -790,6 +790,18 @@ def test_changed_poses_build_the_members_again(run_batch, batch):
 
 
 @pytest.mark.slow
+def test_a_changed_calibration_builds_the_members_again(run_batch, batch):
+    Path("cameras.txt").write_text("1 SIMPLE_PINHOLE 16 16 14 8 8\n")
+    ring = batch.scene["rigs"]["ring"] | {"camera": {"lens": "calibrated", "file": "cameras.txt"}}
+    calibrated = batch.model_copy(update={"scene": batch.scene | {"rigs": {"ring": ring}}})
+    run_batch(calibrated)
+    assert read_json(Path("results/faces/face/member.json"))["state"] == "valid"
+    assert verdict(calibrated).is_fine
+    Path("cameras.txt").write_text("1 SIMPLE_PINHOLE 16 16 15 8 8\n")
+    assert verdict(calibrated).outdated == ["cameras.txt"]
+
+
+@pytest.mark.slow
 def test_a_changed_light_builds_the_members_again(run_batch, batch):
     lit = batch.model_copy(update={"scene": batch.scene | {"scene": {"light": "sky.exr"}}})
     write_exr(Path("sky.exr"), {name: np.ones((2, 4), np.float32) for name in "RGB"})

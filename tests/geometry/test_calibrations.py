@@ -369,6 +369,8 @@ def test_frames_with_cameras_of_their_own_are_chosen_by_their_files(tmp_path):
         ("a.json", '{"fl_x": 5, "w": 4, "h": 4, "camera_model": "X"}', "camera_model: is 'X'"),
         ("a.json", '{"camera_angle_x": 5, "w": 4, "h": 4}', "camera_angle_x: is 5; must be an"),
         ("a.json", '{"fl_x": NaN, "w": 4, "h": 4}', "fl_x: has nan; must be finite"),
+        ("a.json", f'{{"fl_x": {"9" * 400}, "w": 4, "h": 4}}', "fl_x: has 9999"),
+        ("a.json", f'{{"K": {"[" * 500}{"]" * 500}}}', "K: has [[[["),
         ("a.txt", "1 FISHBOWL 4 4 1 2\n", "camera 1: MODEL: is FISHBOWL; must be one of SIMPLE_P"),
         ("a.txt", "1 PINHOLE 4 4 1 2\n", "camera 1: PINHOLE: has 2 numbers; must have 4"),
         ("a.txt", "1 PINHOLE 4 4 1 2 x 4\n", "camera 1: PINHOLE: has 'x'; must be finite numbers"),
@@ -388,12 +390,13 @@ def test_a_damaged_file_names_its_key(tmp_path, name, content, message):
     assert message in str(error.value)
 
 
-def scene(tmp_path, monkeypatch, camera, name="own"):
+def scene(tmp_path, monkeypatch, camera, name="own", **blocks):
     """Write a scene YAML whose rig has a camera, and return the rig's dataset."""
     content = {
         "scene": {"builder": "rooms"},
         "rigs": {"wall": {"type": "plane", "cameras": [2, 2], "baseline": 0.1, "camera": camera}},
         "render": {"samples": 4},
+        **blocks,
     }
     (tmp_path / f"{name}.yaml").write_text(json.dumps(content))
     monkeypatch.setattr(scene_yaml, "SCENES", tmp_path)
@@ -428,3 +431,13 @@ def test_a_lens_ends_at_its_fov():
     axis_angles = np.radians([84, 86])
     rays = np.stack([np.sin(axis_angles), np.zeros(2), -np.cos(axis_angles)], -1)
     assert np.isfinite(lens.pixels(rays)[:, 0]).tolist() == [True, False]
+
+
+def test_views_can_be_resampled_through_a_calibration(tmp_path, monkeypatch):
+    around = {"lens": "equirectangular", "resolution": [64, 32]}
+    euroc = {"camera": {"lens": "calibrated", "file": str(EUROC)}}
+    dataset = scene(tmp_path, monkeypatch, around, reprojections={"euroc": euroc})
+    lens = dataset.reprojections["euroc"].camera.make()
+    directions = points(35)
+    truth = opencv_pixels(directions, EUROC_K, EUROC_D)
+    np.testing.assert_allclose(seen(lens, directions), truth, rtol=0, atol=1e-9)

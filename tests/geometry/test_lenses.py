@@ -736,6 +736,14 @@ def test_a_calibrated_lens_has_its_published_radius_at_50_digits(
     assert seen >= 2
 
 
+def test_a_pixel_that_float32_cannot_hold_is_a_miss() -> None:
+    lens = Division(**LANDSCAPE, focal_length=9, coefficients=(-1e-98,))
+    ray = np.array([1e-3, 0, 1])
+    assert lens.pixels(ray)[0] > 1e90
+    with np.errstate(all="raise"):
+        assert np.isnan(lens.pixels(ray.astype(np.float32))).all()
+
+
 def test_hole_of_a_polynomial_lens() -> None:
     # θ = 0.01 + 0.1 r leaves a hole. A hole narrower than a pixel belongs to the centre.
     axis = np.array([0.0, 0, -1])
@@ -1054,6 +1062,8 @@ def test_cycles_lenses_exist_as_blenders_cameras() -> None:
         ({"sensor_size": (36, 0)}, "must be positive millimetres"),
         ({"sensor_size": (math.inf, 1)}, "must be positive millimetres"),
         ({"principal_point": (math.nan, 1)}, "must be finite pixels"),
+        # An image of twice the size would have no finite one.
+        ({"principal_point": (1, 1e308)}, "must be finite pixels, below 1e99"),
     ],
 )
 def test_every_lens_refuses_an_invalid_image(

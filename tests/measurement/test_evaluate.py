@@ -45,8 +45,9 @@ def rows_of(dataset, name, shown, mask=True, view="view_0001f"):
     """Return the errors of a render by region."""
     source = SourceDataset(dataset, name, ".exr")
     chosen_view = next(each for each in source.lightfield.views if each.name == view)
-    rendered = evaluation.rendered(shown, source, BLACK)
-    true = evaluation.truth(source, chosen_view, shown, BLACK)
+    render = evaluation.rendered(shown, source, BLACK)
+    rendered = render.pictures
+    true = evaluation.truth(source, chosen_view, render.largest, BLACK)
     counted = np.broadcast_to(mask, rendered.colour.shape[:2])
     parts = evaluation.regions(source, chosen_view, counted, true.depth)
     return dict(evaluation.errors(rendered, true, parts, source.lens))
@@ -242,8 +243,8 @@ def test_the_truth_has_no_error_in_16_bits(dataset, tmp_path, suffix):
     for step, expected in ((0, math.inf), (1, 20 * math.log10(65535))):
         images.write_png(render, pixels + np.uint16(step))
         shown = evaluation.rendered(render, source, BLACK)
-        true = evaluation.truth(source, view, render, BLACK)
-        ((_, errors),) = evaluation.errors(shown, true, parts, source.lens)
+        true = evaluation.truth(source, view, shown.largest, BLACK)
+        ((_, errors),) = evaluation.errors(shown.pictures, true, parts, source.lens)
         assert errors["psnr"] == pytest.approx(expected)
 
 
@@ -266,10 +267,11 @@ def compared(source, path, background):
     """Return a render's errors over a background, and the problem with its own background."""
     view = next(view for view in source.lightfield.views if path.stem.endswith(view.name))
     shown = evaluation.rendered(path, source, background)
-    true = evaluation.truth(source, view, path, background)
+    true = evaluation.truth(source, view, shown.largest, background)
     parts = {"all": np.ones((48, 64), bool)}
-    ((_, errors),) = evaluation.errors(shown, true, parts, source.lens)
-    return errors, evaluation.background_problem(shown, true, parts["all"], background)
+    ((_, errors),) = evaluation.errors(shown.pictures, true, parts, source.lens)
+    problem = evaluation.background_problem(shown.pictures, true, parts["all"], background)
+    return errors, problem
 
 
 def on(background, alpha):

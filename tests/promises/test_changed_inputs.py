@@ -1,5 +1,6 @@
 """A user's file that changes after the plan, or in secret, ends in no valid dataset."""
 
+import json
 import os
 import subprocess
 import sys
@@ -11,6 +12,8 @@ import pytest
 from checkouts import assert_same_bytes, checkout, jobs_on, snakemake, start_snakemake
 from PIL import Image
 from waiting import wait_until
+
+from lightfield.core.files import sha256
 
 pytestmark = pytest.mark.slow
 
@@ -109,6 +112,29 @@ def test_a_texture_changed_at_its_size_and_time_is_planned_and_rendered(scene, b
     assert "texture.bmp" in bookkeeping.outdated_in_plan(plan.stderr)["mine/inventory"]
     assert_same_bytes(bright, build(folder))
     assert "Nothing to be done" in snakemake(folder, "--dry-run", *CHOSEN).stderr
+
+
+def test_a_changed_calibration_is_planned_and_rendered(tmp_path):
+    """Its numbers stand in lightfield.json, and in the settings of the jobs that need them."""
+    camera = "camera: {lens: calibrated, file: cameras.txt}"
+    folder = checkout(tmp_path / "plenoforge", mine=BUILT.replace(CAMERA, camera))
+    for file, text in {"mine.py": BUILDER, "helper.py": HELPER, "poses.csv": POSES}.items():
+        (folder / file).write_text(text)
+
+    def calibrated(focal_length):
+        text = f"1 SIMPLE_PINHOLE 16 16 {focal_length} 8 8\n"
+        (folder / "cameras.txt").write_text(text)
+        rig = build(folder) / "results/mine/LFPoses"
+        lightfield = json.loads((rig / "lightfield.json").read_text())
+        assert lightfield["camera"]["focal_length"] == pytest.approx(focal_length * 36 / 16)
+        return sha256(rig / "exr/a.exr")
+
+    before = calibrated(20)
+    (folder / "cameras.txt").write_text("1 SIMPLE_PINHOLE 16 16 30 8 8\n")
+    plan = bookkeeping.outdated_in_plan(snakemake(folder, "--dry-run", *CHOSEN).stderr)
+    assert "mine/LFPoses/lightfield" in plan
+    assert calibrated(30) != before
+    assert calibrated(20) == before
 
 
 @pytest.mark.parametrize(

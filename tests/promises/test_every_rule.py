@@ -55,7 +55,8 @@ exports:
   nerfstudio: {{sources: [perspective], points: 9}}
 sensor: {{noise: {{a: 0.01}}}}
 """
-# Scenes for the rules that a built scene does not need: download, calibration, free places, flow.
+# Scenes for the rules that a built scene does not need: download, calibration, free places, flow,
+# heads.
 BROUGHT = f"""
 licence: CC0-1.0
 scene:
@@ -72,6 +73,13 @@ rigs:
     count: 2
     size: 1
     camera: {CAMERA}
+  pair:
+    type: plane
+    cameras: [2, 1]
+    size: 1
+    head:
+      left: {{camera: {CAMERA}}}
+      right: {{camera: {CAMERA}, position: [0.1, 0, 0]}}
 flow: {{pairs: neighbours}}
 exports:
   instant_ngp: {{sources: [views]}}

@@ -34,6 +34,12 @@ rigs:
     count: 2
     size: 1
     camera: {lens: equidistant, fov: 180, resolution: [16, 16]}
+  pair:
+    type: plane
+    cameras: [2, 1]
+    head:
+      left: {camera: {lens: equidistant, fov: 180, resolution: [16, 16]}}
+      right: {camera: {lens: equidistant, fov: 180, resolution: [16, 16]}, position: [0.1, 0, 0]}
 flow: {pairs: neighbours}
 video: {path: walk, format: webp}
 exports:

@@ -15,6 +15,7 @@ from scipy.ndimage import binary_dilation
 from lightfield.core.errors import UserError
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
+from lightfield.geometry.lenses.cube_map import CubeMap
 
 pytestmark = pytest.mark.slow
 
@@ -168,6 +169,8 @@ def render(scene, monkeypatch):
             np.where(missed, np.nan, distance),
             np.where(missed[..., None], np.nan, rays),
             geometry.passes,
+            opened,
+            pose,
         )
 
     return rendered
@@ -183,6 +186,8 @@ class Picture:
     distance: np.ndarray
     rays: np.ndarray
     passes: dict
+    opened: object
+    pose: np.ndarray
 
 
 def angles(first, second):
@@ -343,6 +348,32 @@ def test_a_dataset_through_a_lens_that_cycles_lacks_is_built_and_valid(tmp_path)
     (geometry,) = (check for check in validation["checks"] if check["name"] == "geometry")
     assert geometry["figures"]["points"] > 1000
     assert geometry["figures"]["agree"] == 1
+
+
+def test_a_window_of_a_view_shows_what_the_whole_view_shows(render):
+    from lightfield.rendering.setup import cycles
+    from lightfield.rendering.views.geometry_pass import render_geometry
+
+    whole = render(LACKING["stereographic"])
+    cycles.set_window(3, 20, 50, 25)
+    depth = render_geometry(whole.opened, whole.pose).depth
+    np.testing.assert_array_equal(depth, whole.depth[20:45, 3:53])
+
+
+def test_drawings_are_left_out_as_through_fisheyes(render):
+    import bpy
+
+    for camera, shows in ((BOTH["rectilinear"], True), (LACKING["stereographic"], False)):
+        render(camera, by_shader=False)
+        assert bpy.context.scene.view_layers[0].use_grease_pencil == shows
+
+
+def test_a_cube_map_is_refused(scene):
+    from lightfield.rendering.setup import cycles
+
+    lightfield = LightField.from_rig(RIG, CubeMap(width=96, height=16), frame=1, render=RENDER)
+    with pytest.raises(UserError, match=r"camera: nothing renders a cube map; reproject"):
+        cycles.set_up(scene, None, lightfield, "cpu", 1)
 
 
 def test_the_scene_keeps_nothing_of_the_test_of_a_shader(render):

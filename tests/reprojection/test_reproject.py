@@ -549,6 +549,17 @@ def test_a_warning_is_printed_once(dataset, run, capsys):
 
 
 @pytest.mark.parametrize(
+    ("fov", "warnings"), [("", 1), (",360deg", 1), (",250deg", 0)], ids=["none", "360", "250"]
+)
+def test_a_lens_that_ends_inside_its_image_is_a_warning(dataset, run, capsys, fov, warnings):
+    run("--double-sphere", f"6,36,-0.172,0.593{fov}", "--png", "--views", "0:1")
+    lines = capsys.readouterr().err.splitlines()
+    found = [line for line in lines if line.startswith("warning: the double-sphere fisheye ends")]
+    assert len(found) == warnings
+    assert all("fov" in line for line in found)
+
+
+@pytest.mark.parametrize(
     "flags",
     [
         ("--equisolid", "10,36,3.0"),

@@ -216,6 +216,11 @@ def misreading(lens: Lens) -> str | None:
     (_, name), _ = camera(lens)
     if name in _NOT_READ_BY:
         return f"is COLMAP's {name}, which {_NOT_READ_BY[name]}; give them perspective views"
+    if name == "OPENCV":
+        return (
+            "gsplat undistorts it as if the first pixel's centre were at (0, 0), and moves pixels "
+            "by up to a half; give gsplat perspective views, or the export ncore"
+        )
     return cameras.misreading(lens)
 
 

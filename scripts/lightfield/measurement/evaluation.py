@@ -20,6 +20,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path
 from lightfield.export.source import Bools, Floats, SourceDataset
 from lightfield.formats.depth import check_size
+from lightfield.formats.gaussians import Gaussians
 from lightfield.formats.lightfield import View
 from lightfield.geometry.depth import converted
 from lightfield.geometry.lenses import Lens
@@ -38,6 +39,7 @@ from lightfield.measurement.picture_difference import (
     ssim_map,
     ws_psnr,
 )
+from lightfield.measurement.splat import draw
 
 # The width of an edge in pixels.
 _EDGE_PIXELS = 5
@@ -59,6 +61,19 @@ class Pictures:
     alpha: Floats | None
     depth: Floats | None
     normals: Floats | None
+
+
+@dataclass(frozen=True)
+class Render:
+    """A picture to compare with a view.
+
+    - ``name``: for messages and errors.
+    - ``largest``: the largest value of a PNG: 255 or 65535. None for an EXR.
+    """
+
+    name: str
+    pictures: Pictures
+    largest: int | None
 
 
 def find(
@@ -105,15 +120,14 @@ def mask(path: Path, source: SourceDataset) -> Bools:
     return np.asarray(pixels > 0)
 
 
-def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> Pictures:
+def truth(source: SourceDataset, view: View, largest: int | None, background: Floats) -> Pictures:
     """Return a dataset's own view over a background (3,) in sRGB, 0 to 1.
 
-    ``like`` is the picture to compare it with. If that is a PNG, the view is rounded as a PNG with
-    the same number of bits, and composited in sRGB. Otherwise it is composited as light.
+    With the ``largest`` value of a PNG, the view is rounded as in such a PNG, and composited in
+    sRGB. Without it, the view is composited as light, as an EXR is.
     """
     transparent = source.lightfield.transparent
-    if like.suffix == ".png":
-        largest = np.iinfo(images.read_image(like, ["R"]).channels["R"].dtype).max
+    if largest:
         colour, alpha = _rounded(source, view, largest)
         colour = _on_background(colour, alpha, background, largest)
     else:
@@ -134,8 +148,8 @@ def truth(source: SourceDataset, view: View, like: Path, background: Floats) -> 
     )
 
 
-def rendered(path: Path, source: SourceDataset, background: Floats) -> Pictures:
-    """Return a render over a background (3,) in sRGB, 0 to 1.
+def rendered(path: Path, source: SourceDataset, background: Floats) -> Render:
+    """Return the render in a file, over a background (3,) in sRGB, 0 to 1.
 
     Raises `UserError` if it has no colour, or another size than the dataset's.
     """
@@ -147,7 +161,30 @@ def rendered(path: Path, source: SourceDataset, background: Floats) -> Pictures:
     colour = _developed(image, alpha, source, background)
     depth = image.channels.get("Z")
     normals = _normals(path.parent / _NORMALS / f"{path.stem}.exr", source)
-    return Pictures(colour, alpha, None if depth is None else depth.astype(np.float64), normals)
+    kind = image.channels["R"].dtype
+    return Render(
+        str(path),
+        Pictures(colour, alpha, None if depth is None else depth.astype(np.float64), normals),
+        np.iinfo(kind).max if path.suffix == ".png" else None,
+    )
+
+
+def drawn(
+    splat: Gaussians, name: str, source: SourceDataset, view: View, background: Floats
+) -> Render:
+    """Return what a Gaussian splat shows in a view, over a background (3,) in sRGB, 0 to 1.
+
+    Its depth is infinite where the view's is: Gaussians of a sky are somewhere.
+    """
+    picture = draw(splat, view, source.lens)
+    through = (1 - picture.coverage)[..., np.newaxis]
+    colour = (picture.colour + through * background).clip(0, 1)
+    depth = None
+    kind = source.lightfield.depth
+    if source.has_depth and kind:
+        drawn_depth = converted(picture.distance, source.lens.pixel_rays(), "distance", kind)
+        depth = np.where(np.isposinf(source.depth(view, kind)), np.inf, drawn_depth)
+    return Render(f"{name}: {view.name}", Pictures(colour, None, depth, None), 255)
 
 
 def _rounded(source: SourceDataset, view: View, largest: int) -> tuple[Floats, Floats | None]:

@@ -1,7 +1,7 @@
 """Writes the errors of rendered test views as a table, and as a page with the pictures."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +14,11 @@ from lightfield.core.names import VIEWS
 from lightfield.core.progress import Progress
 from lightfield.export.source import Floats, SourceDataset
 from lightfield.export.trainer_splits import splits
+from lightfield.formats import gaussians
 from lightfield.formats.lightfield import View
 from lightfield.imaging import images
 from lightfield.measurement import evaluation
+from lightfield.measurement.evaluation import Render
 from lightfield.measurement.picture_difference import flip_map
 from lightfield.report import page
 from lightfield.stages.measurement import Evaluate, EvaluationSettings
@@ -78,19 +80,21 @@ def write(
 
     Pictures with alpha are composited over ``background`` (3,) in sRGB, 0 to 1. Warns about renders
     whose alpha or background differs from the truth's. Raises `UserError` for a render that is
-    missing in the folder ``renders``, or that cannot be compared.
+    missing in the folder ``renders``, or that cannot be compared. ``renders`` may be the PLY of a
+    Gaussian splat, which is drawn.
     """
-    paths = {view.name: evaluation.find(renders, source, view) for view in tests}
+    read = _reader(renders, source, tests, background)
     rows: list[dict[str, Any]] = []
     problems = []
     progress = Progress(len(tests), "evaluate", "views")
     for view in tests:
         mask = evaluation.find(masks, source, view, [".png"]) if masks else None
         picture = output / "pictures" / f"{view.name}.png"
-        errors, problem = _compare(view, paths[view.name], source, mask, background, picture)
+        render = read(view)
+        errors, problem = _compare(view, render, source, mask, background, picture)
         rows += errors
         if problem:
-            problems.append(f"{paths[view.name]}: {problem}")
+            problems.append(f"{render.name}: {problem}")
         progress.done()
     if problems:
         count = f" (and {len(problems) - 1} more of {len(tests)})" if problems[1:] else ""
@@ -114,28 +118,39 @@ def write(
     return means[0]
 
 
+def _reader(
+    renders: Path, source: SourceDataset, tests: Sequence[View], background: Floats
+) -> Callable[[View], Render]:
+    """Return the function that returns a view's render. All renders must be there."""
+    if renders.suffix == ".ply":
+        splat = gaussians.read(renders)
+        return lambda view: evaluation.drawn(splat, str(renders), source, view, background)
+    paths = {view.name: evaluation.find(renders, source, view) for view in tests}
+    return lambda view: evaluation.rendered(paths[view.name], source, background)
+
+
 def _compare(
     view: View,
-    path: Path,
+    render: Render,
     source: SourceDataset,
     mask: Path | None,
     background: Floats,
     picture: Path,
 ) -> tuple[list[dict[str, Any]], str | None]:
-    """Return a row of errors for each region of the render at ``path``, and a warning or None.
+    """Return a row of errors for each region of a ``render``, and a warning or None.
 
     Writes the truth, the render and the FLIP map beside each other to ``picture``.
     """
-    shown = evaluation.rendered(path, source, background)
-    true = evaluation.truth(source, view, path, background)
+    shown = render.pictures
+    true = evaluation.truth(source, view, render.largest, background)
     counted = np.ones(shown.colour.shape[:2], bool)
     if mask:
         counted = evaluation.mask(mask, source)
     regions = evaluation.regions(source, view, counted, true.depth)
     if not regions:
-        raise UserError(f"{path}: its mask leaves no pixel that the lens sees")
+        raise UserError(f"{render.name}: its mask leaves no pixel that the lens sees")
     if not np.isfinite(shown.colour[regions["all"]]).all():
-        raise UserError(f"{path}: has colour that is not a number where it is compared")
+        raise UserError(f"{render.name}: has colour that is not a number where it is compared")
     rows = [
         {"view": view.name, "region": region, **errors}
         for region, errors in evaluation.errors(shown, true, regions, source.lens)

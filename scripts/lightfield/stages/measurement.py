@@ -347,7 +347,11 @@ class Evaluate(Stage[EvaluationSettings]):
     function = "lightfield.report.evaluation_page:evaluate"
     by_hand = EvaluationSettings
 
-    renders: Path = reads("folder of the renders to evaluate", positional=True, metavar="RENDERS")
+    renders: Path = reads(
+        "folder of the renders to evaluate, or PLY of a Gaussian splat",
+        positional=True,
+        metavar="RENDERS",
+    )
     dataset: Path = reads("the dataset's folder")
     masks: Path | None = reads(
         "folder of masks, <view>.png; pixels that are 0 in them are not compared", None

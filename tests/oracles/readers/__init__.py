@@ -41,6 +41,7 @@ from oracles.readers import (
     poses_csv,
     scannetpp,
     scene_flow,
+    splat,
 )
 from oracles.readers.contents import Exported
 
@@ -58,9 +59,10 @@ READERS = {
     "point_cloud": point_cloud.read,
     "poses_csv": poses_csv.read,
     "scannetpp": scannetpp.read,
+    "splat": splat.read,
 }
 
-WITHOUT_VIEWS = ("coco", "mesh", "point_cloud")
+WITHOUT_VIEWS = ("coco", "mesh", "point_cloud", "splat")
 """The exports that have no poses of views."""
 
 SEQUENCE_READERS = {

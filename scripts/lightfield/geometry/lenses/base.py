@@ -150,8 +150,11 @@ class Lens(ABC):
             raise UserError(f"resolution: {self.width} × {self.height} is not an image")
         if not all(0.0 < side < math.inf for side in self.sensor):
             raise UserError(f"sensor_size: {list(self.sensor)} must be positive millimetres")
-        if not all(math.isfinite(coordinate) for coordinate in self.center):
-            raise UserError(f"principal_point: {list(self.center)} must be finite pixels")
+        # `resized` multiplies it, which must not overflow.
+        if not all(abs(coordinate) < 1e99 for coordinate in self.center):
+            raise UserError(
+                f"principal_point: {list(self.center)} must be finite pixels, below 1e99"
+            )
 
     @property
     def sensor(self) -> Pair:
@@ -229,7 +232,9 @@ class Lens(ABC):
         NaN where the lens does not see the ray. Coordinates may lie outside the frame.
         """
         (array,) = _as_float(rays)
-        pixels = self._pixels(np.atleast_2d(array)).astype(array.dtype, copy=False)
+        # A coordinate beyond float32 becomes infinite: a miss.
+        with np.errstate(over="ignore"):
+            pixels = self._pixels(np.atleast_2d(array)).astype(array.dtype, copy=False)
         missed = ~np.isfinite(pixels[..., 0] + pixels[..., 1])
         if missed.any():
             pixels[missed] = np.nan

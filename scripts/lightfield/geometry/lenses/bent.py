@@ -95,7 +95,7 @@ class BentLens(CalibratedLens):
             return end
         # Steps that grow with t, because t has no bound for a lens of 180 degrees.
         t = np.sinh(np.linspace(0, math.asinh(end), 4097))[1:]
-        folds = np.flatnonzero(self._spread(t) <= 0)
+        folds = np.flatnonzero(~(self._spread(t) > 0))
         if not folds.size:
             return end
         low, high = (0.0, *t)[folds[0]], t[folds[0]]
@@ -103,6 +103,7 @@ class BentLens(CalibratedLens):
             low, high = (middle, high) if self._spread(middle) > 0 else (low, middle)
         return float(low)
 
+    @np.errstate(divide="ignore", invalid="ignore", over="ignore")
     def _spread(self, t: Array) -> Array:
         """Return a lower bound of the symmetric Jacobian's eigenvalues at t."""
         radial = np.minimum(self._plane.slope(t), self._plane.value(t) / t)
@@ -139,7 +140,7 @@ class BentLens(CalibratedLens):
             for first in range(0, flat.shape[1], BLOCK):
                 block = slice(first, first + BLOCK)
                 flat[:, block] = self._solved(flat[:, block])
-        return points[0].astype(u.dtype), points[1].astype(v.dtype)
+            return points[0].astype(u.dtype), points[1].astype(v.dtype)
 
     def _solved(self, goals: Array) -> Array:
         """Return the radial points (2, n) that the bend moves to ``goals``. NaN without one.

@@ -65,9 +65,14 @@ class BrownConrady(BentLens):
         # The derivative of t · above / below is rising / below².
         rising = (above + 2 * square * above.deriv()) * below - 2 * square * above * below.deriv()
 
+        # A coefficient may be as large as 1e99.
+        quiet = np.errstate(divide="ignore", invalid="ignore", over="ignore")
+
+        @quiet
         def value(t: Any) -> Any:
             return t * (above(t * t) / below(t * t))
 
+        @quiet
         def slope(t: Any) -> Any:
             return rising(t * t) / below(t * t) ** 2
 

@@ -12,6 +12,7 @@ import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from reprlib import repr as shortened
 from typing import Any, Literal, NamedTuple
 from xml.etree import ElementTree
 
@@ -30,6 +31,7 @@ FORMATS = (
 )
 # In bytes. OpenCV's files may list all corners of all boards.
 _LARGEST_FILE = 2**24
+_LARGEST_NUMBER = 1e99
 # From the centre of the first pixel to the image's corner.
 _HALF = 0.5
 
@@ -233,8 +235,9 @@ class _Keys:
         numbers = []
         for value in values:
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not is_number or not math.isfinite(value):
-                raise self.error(key, f"has {value!r}; must be finite numbers")
+            # Compared without conversion: a whole number may be too large for a float.
+            if not is_number or not -_LARGEST_NUMBER < value < _LARGEST_NUMBER:
+                raise self.error(key, f"has {shortened(value)}; must be finite numbers")
             numbers.append(float(value))
         return tuple(numbers)
 
@@ -270,9 +273,11 @@ class _Keys:
 
 
 def _flattened(value: Any) -> Iterable[Any]:
+    """Return the values of a list, or of the rows of a matrix."""
     if not isinstance(value, list):
         return [value]
-    return [number for part in value for number in _flattened(part)]
+    rows = [part if isinstance(part, list) else [part] for part in value]
+    return [number for row in rows for number in row]
 
 
 # OpenCV and ROS

@@ -14,10 +14,13 @@ BLOCK = 2**14
 
 def first_fall(polynomial: np.polynomial.Polynomial) -> float:
     """Return the smallest t > 0 at which a polynomial falls below zero, or inf."""
-    roots = np.roots(polynomial.coef[::-1])
-    real = np.sort(roots.real[(np.abs(roots.imag) <= 1e-12 * np.abs(roots)) & (roots.real > 0)])
-    after = np.append((real[:-1] + real[1:]) / 2, real[-1:] * 2)
-    falling = real[polynomial(after) < 0]
+    # A coefficient may be as large as 1e99.
+    with np.errstate(over="ignore", invalid="ignore"):
+        roots = np.roots(polynomial.coef[::-1])
+        is_real = np.abs(roots.imag) <= 1e-12 * np.abs(roots)
+        real = np.sort(roots.real[is_real & (roots.real > 0)])
+        after = np.append((real[:-1] + real[1:]) / 2, real[-1:] * 2)
+        falling = real[polynomial(after) < 0]
     return float(falling[0]) if falling.size else math.inf
 
 

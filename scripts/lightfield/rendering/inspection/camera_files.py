@@ -31,7 +31,7 @@ def write_places(job: FreePlaces) -> None:
         if job.inventory is None:
             raise UserError("--inventory: is missing; scripts/inventory.py measures the scene")
         rig = fitted(rig, scene_box(job.inventory))
-    blend_file.open_scene(job.blend, settings.model_dump(), contents)
+    blend_file.open_scene(job.blend, settings.as_json(), contents)
     if isinstance(settings.frame, int):
         frames.go_to(settings.frame)
     viewport.show_what_is_rendered()

@@ -39,7 +39,7 @@ def surface_of(job: WriteSurface) -> tuple[SceneSurface, int]:
     settings = job.settings
     path = job.inventory
     inventory = read_inventory(path, "left_out", "hidden") if path else None
-    blend_file.open_scene(job.blend, settings.model_dump(), inventory)
+    blend_file.open_scene(job.blend, settings.as_json(), inventory)
     if settings.numbered:
         # The numbers follow from the objects that a render keeps.
         hidden = inventory["hidden"] if inventory else pruning.removable_objects()
