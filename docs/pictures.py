@@ -179,7 +179,7 @@ def draw_places(path: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--passes", type=Path, help="dataset whose passes are drawn")
-    parser.add_argument("--lenses", type=Path, help="scene whose head has all lenses")
+    parser.add_argument("--lenses", type=Path, help="results of a scene whose head has all lenses")
     parser.add_argument("--walk", type=Path, help="folder of synthesised views of a closed path")
     parser.add_argument("--points", type=Path, help="dataset around an object, with alpha")
     parser.add_argument("--depth", type=Path, help="dataset of fisheyes, of which one is drawn")
