@@ -259,6 +259,35 @@ def test_nerf_synthetic_is_read_with_its_own_formula(dataset, tmp_path):
     assert len(names) == 12
 
 
+def test_nerfbaselines_finds_its_lists_and_a_mask_of_every_image(dataset, tmp_path):
+    """Follows load_colmap_dataset in nerfbaselines' datasets/colmap.py."""
+    shutil.copytree(dataset, tmp_path / "dataset")
+    path = tmp_path / "dataset" / "split" / "view_0003f.exr"
+    image = images.read_image(path)
+    depth = image.channels["Z"].copy()
+    depth[:5] = np.nan
+    images.write_exr(path, image.channels | {"Z": depth}, image.attributes)
+    folder = exported(tmp_path / "dataset", "nerfbaselines", "split", tmp_path, points=50)
+    info = json.loads((folder / "nb-info.json").read_text())
+    assert info == {"loader": "colmap", "id": "plenoforge", "scene": "dataset"}
+    model = pycolmap.Reconstruction(folder / "sparse/0")
+    names = {image.name for image in model.images.values()}
+    train, test = (
+        (folder / f"{part}_list.txt").read_text().splitlines() for part in ("train", "test")
+    )
+    assert sorted(train + test) == sorted(names)
+    assert test == [f"view_{number:04d}f.png" for number in range(1, 12, 2)]
+    for name in names:
+        assert (folder / "images" / name).is_file()
+        mask = cv2.imread(str((folder / "masks" / name).with_suffix(".png")), cv2.IMREAD_GRAYSCALE)
+        empty = np.zeros((48, 64), bool)
+        empty[:5] = name == "view_0003f.png"
+        np.testing.assert_array_equal(mask == 0, empty)
+    whole = exported(tmp_path / "dataset", "nerfbaselines", "perspective", tmp_path, points=50)
+    # With a folder of masks, nerfbaselines would read one for each image.
+    assert not (whole / "masks").exists()
+
+
 def of_disparity(levels, camera, bits):
     near, far = camera["Depth_range"]
     return 1 / (1 / far + levels / (2**bits - 1) * (1 / near - 1 / far))
@@ -1016,6 +1045,8 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
             "is a part of a panorama",
         ),
         ("nerfstudio", "views", VIEWS, {"splatfacto": True}, "taken for a pinhole by splatfacto"),
+        ("nerfbaselines", "views", LENSES["fisheye"], {}, "nerfbaselines does not find; reproject"),
+        ("nerfbaselines", "views", OTHERS["three_radial"], {}, "has k3 to k6"),
         ("nerf_synthetic", "views", VIEWS, {}, "is not a pinhole camera"),
         ("nerf_synthetic", "views", LENSES["shifted"] | {"sensor_size": 36}, {}, "off centre"),
         ("opendibr", "views", VIEWS | {"principal_point": [40, 48]}, {}, "axis off centre"),
