@@ -94,6 +94,7 @@ EXPORTS = {
         "colmap": {"format": "text", "points": 60},
         "lichtfeld": {"points": 60},
         "nerfbaselines": {"points": 60},
+        "nerf_synthetic": {"scale": 0.7},
         "nerfstudio": {"points": 60},
     },
 }
