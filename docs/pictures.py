@@ -106,10 +106,13 @@ def draw_passes(path: Path, folder: Path) -> None:
 
 
 def draw_lenses(path: Path, folder: Path) -> None:
-    """Draw the first view of each of a dataset's reprojections."""
-    images = sorted(folder.glob("*/view_*.png"))
-    tiles = {file.parent.name: Image.open(file).convert("RGB") for file in images}
-    sheet(path, dict(sorted(tiles.items(), key=lambda item: item[1].width)), 4)
+    """Draw the first picture of each camera of a head."""
+    tiles = {}
+    for dataset in sorted(folder.glob("*/lightfield.json")):
+        name = LightField.read(dataset).head.name
+        picture = min(dataset.parent.glob("png/view_*.png"))
+        tiles[name] = Image.open(picture).convert("RGB")
+    sheet(path, dict(sorted(tiles.items(), key=lambda item: item[1].width)), 6)
 
 
 def draw_walk(path: Path, folder: Path) -> None:
@@ -176,7 +179,7 @@ def draw_places(path: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--passes", type=Path, help="dataset whose passes are drawn")
-    parser.add_argument("--lenses", type=Path, help="dataset whose reprojections are drawn")
+    parser.add_argument("--lenses", type=Path, help="results of a scene whose head has all lenses")
     parser.add_argument("--walk", type=Path, help="folder of synthesised views of a closed path")
     parser.add_argument("--points", type=Path, help="dataset around an object, with alpha")
     parser.add_argument("--depth", type=Path, help="dataset of fisheyes, of which one is drawn")

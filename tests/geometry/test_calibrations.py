@@ -106,6 +106,12 @@ def test_opencvs_fisheye_is_told_by_its_file_or_by_the_user(tmp_path):
         read(file, model="brown_conrady")
 
 
+def test_a_model_that_a_files_own_contradicts_is_refused():
+    assert read(TUM_VI, "cam0", model="kannala_brandt").name == "kannala_brandt"
+    with pytest.raises(UserError, match=r"describes the lens kannala_brandt; leave out the key mo"):
+        read(TUM_VI, "cam0", model="brown_conrady")
+
+
 def test_four_coefficients_of_opencvs_usual_lens_need_its_name(tmp_path):
     path = written_by_opencv(tmp_path / "camera.yml", EUROC_D, **SIZE)
     directions = points(40)

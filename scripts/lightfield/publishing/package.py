@@ -51,6 +51,9 @@ LOADERS = {name: exporter.loader for name, exporter in EXPORTERS.items()} | {
     VIDEO: "from glob import glob\n(video,) = glob('{}/*.[mw]*')  # a browser plays it",
 }
 
+# At most: two empty blocks, and zeros up to a whole record.
+TAR_END = 2 * tarfile.BLOCKSIZE + tarfile.RECORDSIZE
+
 
 def write(job: Package) -> None:
     """Pack the folder of a rig, and write a JSON with its card and its parts beside the archive."""
@@ -222,13 +225,13 @@ def _parts(paths: Sequence[Path], most: float | None, first: int) -> Iterator[li
     The first tar holds ``first`` bytes beside its files.
     """
     part: list[Path] = []
-    size = tarfile.RECORDSIZE + first
+    size = TAR_END + first
     for path in paths:
         needed = tar_size(path.stat().st_size)
         if part and most is not None and size + needed > most:
             yield part
             part = []
-            size = tarfile.RECORDSIZE
+            size = TAR_END
         part.append(path)
         size += needed
     yield part

@@ -33,7 +33,7 @@ from lightfield.formats.layout import (
 from lightfield.formats.lightfield import NAME, OMNIDIRECTIONAL
 from lightfield.imaging.look import Look
 from lightfield.publishing import thumbnails
-from lightfield.publishing.package import add_entry, tar_size
+from lightfield.publishing.package import TAR_END, add_entry, tar_size
 
 # A shard's size without a size in the settings. WebDataset advises about this.
 SHARD_BYTES = 1e9
@@ -248,13 +248,13 @@ def write_others(output: Path, name: str, datasets: Sequence[DatasetFiles]) -> P
 def parts(samples: Iterable[OfTar], most: float) -> Iterator[list[OfTar]]:
     """Yield runs of samples whose tar has at most ``most`` bytes. A larger sample is alone."""
     part: list[OfTar] = []
-    size = float(tarfile.RECORDSIZE)
+    size = float(TAR_END)
     for sample in samples:
         needed = sample.tar_bytes
         if part and size + needed > most:
             yield part
             part = []
-            size = tarfile.RECORDSIZE
+            size = TAR_END
         part.append(sample)
         size += needed
     if part:

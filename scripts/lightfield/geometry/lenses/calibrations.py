@@ -68,15 +68,21 @@ def read(
     """Return the lens that a calibration file describes.
 
     ``camera`` chooses one of several cameras by its name or number. ``model`` says which lens four
-    coefficients of OpenCV belong to. ``resolution`` in pixels is for a file without it. ``fov`` in
-    radians ends the lens at half of this angle. The lens's sensor is 36 mm wide. Raises `UserError`
-    that names the file and the key.
+    coefficients of OpenCV belong to, and must not contradict the file. ``resolution`` in pixels is
+    for a file without it. ``fov`` in radians ends the lens at half of this angle. The lens's sensor
+    is 36 mm wide. Raises `UserError` that names the file and the key.
     """
     receipts.note_inputs([path])
     cameras = _cameras(path)
     name = _chosen(path, cameras, camera)
     try:
-        return _lens(cameras[name](_Hints(model, resolution)), fov)
+        calibration = cameras[name](_Hints(model, resolution))
+        if model not in (None, calibration.lens):
+            raise UserError(
+                f"describes the lens {calibration.lens}; leave out the key model, which says "
+                f"{model}"
+            )
+        return _lens(calibration, fov)
     except UserError as error:
         raise UserError(f"{path}: {error}") from None
 
