@@ -582,6 +582,7 @@ REFUSED = [
             ("instant_ngp", "bounds", "all"),
             ("instant_ngp", "render_aabb", [[0, 0, 0]]),
             ("instant_ngp", "render_aabb", [[1, 1, 1], [0, 0, 0]]),
+            ("wai", "exposure", 101),
             ("opendibr", "format", "mp4"),
             ("ncore", "points", 0),
             ("lichtfeld", "format", "jpg"),

@@ -329,7 +329,7 @@ def read_transforms(path, _):
 
 def export_list(rng):
     formats = ["nerfstudio", "nerf_synthetic", "opendibr", "miv", "scannetpp", "colmap"]
-    formats += ["ncore", "lichtfeld"]
+    formats += ["ncore", "lichtfeld", "wai"]
     return {
         "format": rng.choice([*formats, "hci", "point_cloud", "poses_csv"]),
         "options": {"depth": True},
@@ -665,6 +665,7 @@ EXPORTS = {
     "ncore": {"points": 20},
     "poses_csv": {},
     "point_cloud": {"voxel": 0.1},
+    "wai": {},
 }
 PICTURES = {".png", ".exr", ".yuv", ".mp4"}
 

@@ -21,11 +21,15 @@ from oracles.readers.ply import read_vertices
 from pydantic import TypeAdapter, ValidationError
 from scipy.spatial.transform import Rotation
 from sphere import (
+    BALL,
+    BALL_RADIUS,
     CALIBRATED,
     LENSES,
     RADIUS,
     colour_of,
+    enlarged,
     look,
+    look_at_ball,
     make_transparent,
     write_views,
 )
@@ -975,6 +979,133 @@ def test_a_point_cloud_has_a_coloured_point_per_voxel_and_normals_to_the_cameras
     assert np.degrees(np.arccos((normals[has_normal] * inward).sum(axis=-1).clip(-1, 1))).max() < 5
 
 
+def wai_camera(frame):
+    """Return the intrinsic matrix of a frame, as MapAnything's load_frame gives it."""
+    fx, fy, cx, cy = (frame[key] for key in ("fl_x", "fl_y", "cx", "cy"))
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+
+
+def wai_depth(folder, frame):
+    """Return the one channel of a frame's depth. OpenCV's EXR reader takes Y for a plane."""
+    (channels,) = (part.channels for part in OpenEXR.File(str(folder / frame["depth"])).parts)
+    assert [*channels] == ["Y"]
+    return channels["Y"].pixels
+
+
+def wai_points(folder, frame):
+    """Return the world points (h, w, 3) of a frame, as MapAnything lifts them from its depth."""
+    depth = wai_depth(folder, frame)
+    assert depth.dtype == np.float32
+    assert depth.shape == (frame["h"], frame["w"])
+    v, u = np.mgrid[: frame["h"], : frame["w"]]
+    rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(wai_camera(frame)).T
+    matrix = np.array(frame["transform_matrix"])
+    points = rays * depth[..., None] @ matrix[:3, :3].T + matrix[:3, 3]
+    return np.where(depth[..., None] > 0, points, np.nan)
+
+
+def wai_shares(folder, content):
+    """Return the shares of pixels that views see of each other, as MapAnything reads them."""
+    modality = content["scene_modalities"]["pairwise_covisibility"]
+    count = len(content["frames"])
+    assert modality["format"] == "mmap"
+    assert modality["scene_key"].endswith(f"--{count}x{count}.npy")
+    path = folder / modality["scene_key"]
+    np.testing.assert_array_equal(
+        np.load(path), np.fromfile(path, "<f4", offset=128).reshape(count, count)
+    )
+    return np.load(path)
+
+
+@pytest.mark.parametrize("source", ["perspective", "shifted"])
+def test_wai_lifts_depth_to_points_with_the_colours_of_its_images(dataset, tmp_path, source):
+    folder = exported(dataset, "wai", source, tmp_path)
+    content = json.loads((folder / "scene_meta.json").read_text())
+    assert (content["camera_model"], content["camera_convention"]) == ("PINHOLE", "opencv")
+    assert len(content["frames"]) == 12
+    for frame in content["frames"]:
+        points = wai_points(folder, frame)
+        on_sphere(points, 1e-5)
+        picture = cv2.imread(str(folder / frame["image"]), cv2.IMREAD_UNCHANGED)[..., ::-1]
+        np.testing.assert_allclose(picture, colour_of(points), atol=0.6)
+
+
+def test_wai_counts_the_pixels_whose_surface_another_view_sees(dataset, tmp_path):
+    """Nothing hides the inside of a sphere, so a view sees all of it that is in its frame."""
+    folder = exported(dataset, "wai", "shifted", tmp_path)
+    content = json.loads((folder / "scene_meta.json").read_text())
+    shares = wai_shares(folder, content)
+    for row, first in enumerate(content["frames"]):
+        points = wai_points(folder, first)
+        for column, second in enumerate(content["frames"]):
+            local = (points - np.array(second["transform_matrix"])[:3, 3]) @ np.array(
+                second["transform_matrix"]
+            )[:3, :3]
+            pixels = local @ wai_camera(second).T
+            with np.errstate(invalid="ignore"):
+                pixels = np.rint(pixels[..., :2] / pixels[..., 2:])
+            in_frame = (pixels >= 0) & (pixels < [second["w"], second["h"]])
+            share = (in_frame.all(axis=-1) & (local[..., 2] > 0)).mean()
+            assert shares[row, column] == pytest.approx(share, abs=2e-3)
+    assert shares.min() < 0.9
+
+
+def test_wai_does_not_count_a_surface_that_another_one_hides(tmp_path):
+    """A ball hides a part of the sphere from each view."""
+    rig = {"type": "plane", "cameras": [3, 1], "size": 1.2}
+    camera = enlarged(LENSES["perspective"], 4)
+    write_views(tmp_path / "dataset", camera, rig, see=look_at_ball)
+    folder = exported(tmp_path / "dataset", "wai", "views", tmp_path)
+    content = json.loads((folder / "scene_meta.json").read_text())
+    shares = wai_shares(folder, content)
+    _, _, right = (np.array(frame["transform_matrix"]) for frame in content["frames"])
+    points = wai_points(folder, content["frames"][0])
+    local = (points - right[:3, 3]) @ right[:3, :3]
+    pixels = local @ wai_camera(content["frames"][2]).T
+    pixels = np.rint(pixels[..., :2] / pixels[..., 2:])
+    in_frame = ((pixels >= 0) & (pixels < camera["resolution"])).all(axis=-1)
+    to_points = points - right[:3, 3]
+    along = np.clip(((BALL - right[:3, 3]) * to_points).sum(-1) / (to_points**2).sum(-1), 0, 1)
+    nearest = np.linalg.norm(right[:3, 3] + along[..., None] * to_points - BALL, axis=-1)
+    hidden = nearest < BALL_RADIUS - 1e-3
+    assert (in_frame & hidden).mean() > 0.05
+    assert shares[0, 2] == pytest.approx((in_frame & ~hidden).mean(), abs=0.01)
+
+
+def test_wai_has_masks_of_pixels_that_show_nothing_and_no_depth_there(tmp_path):
+    write_views(tmp_path / "dataset", VIEWS, RIG)
+    write_views(tmp_path / "dataset/flat", LENSES["perspective"], RIG)
+    view = next(iter(sorted((tmp_path / "dataset/flat").glob("*.exr"))))
+    image = images.read_image(view)
+    channels = {name: plane.copy() for name, plane in image.channels.items()}
+    channels["Z"][:5] = np.nan
+    images.write_exr(view, channels, image.attributes)
+    folder = exported(tmp_path / "dataset", "wai", "flat", tmp_path)
+    content = json.loads((folder / "scene_meta.json").read_text())
+    (masked,) = (frame for frame in content["frames"] if "mask_path" in frame)
+    assert masked["frame_name"] == view.stem
+    assert content["frame_modalities"]["mask"] == {"frame_key": "mask_path", "format": "binary"}
+    mask = cv2.imread(str(folder / masked["mask_path"]), cv2.IMREAD_UNCHANGED)
+    depth = wai_depth(folder, masked)
+    assert (mask[:5] == 0).all()
+    assert (mask[5:] == 255).all()
+    np.testing.assert_array_equal(depth > 0, mask > 0)
+    assert wai_shares(folder, content)[0, 0] == pytest.approx(43 / 48)
+
+
+def test_wai_shows_transparent_views_in_front_of_black(tmp_path):
+    write_views(tmp_path / "dataset", LENSES["perspective"], RIG)
+    opaque = exported(tmp_path / "dataset", "wai", "views", tmp_path / "opaque")
+    make_transparent(tmp_path / "dataset", 0.25)
+    folder = exported(tmp_path / "dataset", "wai", "views", tmp_path)
+    for path in sorted((opaque / "images").iterdir()):
+        # The light is premultiplied already.
+        expected = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        shown = cv2.imread(str(folder / "images" / path.name), cv2.IMREAD_UNCHANGED)
+        assert shown.shape == (48, 64, 3)
+        np.testing.assert_allclose(shown, expected, atol=1)
+
+
 def test_poses_csv_can_be_read_as_a_rig(dataset, tmp_path):
     folder = exported(dataset, "poses_csv", "perspective", tmp_path)
     with (folder / "poses.csv").open() as file:
@@ -1141,6 +1272,8 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
             "holds no depth; give reprojections.again format: exr",
         ),
         ("lichtfeld", "again", VIEWS, {"normals": True}, "lacks the pass normal; add it to"),
+        ("wai", "views", VIEWS, {}, "is not perspective, but MapAnything takes only such views"),
+        ("wai", "again", VIEWS, {}, "holds no depth; give reprojections.again format: exr"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),
     ],
 )

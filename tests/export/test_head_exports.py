@@ -17,7 +17,7 @@ from oracles.readers.ply import read_vertices
 from pydantic import TypeAdapter
 from sphere import CALIBRATED as COLMAPS
 from sphere import LENSES, colour_of, write_views
-from test_exports import ncore_pixels, on_sphere
+from test_exports import ncore_pixels, on_sphere, wai_points, wai_shares
 
 from lightfield.configuration.heads import with_cameras
 from lightfield.core.errors import UserError
@@ -224,6 +224,28 @@ def test_nerfstudio_gives_each_frame_its_own_intrinsics(three, tmp_path):
         )
     vertices = read_vertices(folder / "points.ply")
     on_sphere(np.stack([vertices[name] for name in "xyz"], axis=-1), 1e-5)
+
+
+def test_wai_has_the_lens_of_each_camera_of_a_head(tmp_path):
+    shifted = {"camera": LENSES["shifted"], "position": [0.12, 0, 0]}
+    head = {"left": HEAD["left"], "right": shifted}
+    folders = datasets(tmp_path, head)
+    folder = exported(folders, "wai", tmp_path / "wai")
+    content = json.loads((folder / "scene_meta.json").read_text())
+    assert content["shared_intrinsics"] is False
+    views = views_of(folders, head)
+    frames = {f"{frame['frame_name']}.png": frame for frame in content["frames"]}
+    assert frames.keys() == views.keys()
+    for name, frame in frames.items():
+        on_sphere(wai_points(folder, frame), 1e-5)
+        matrix = np.array(frame["transform_matrix"]) @ FLIP
+        np.testing.assert_allclose(matrix, views[name].world_from_camera, atol=1e-12)
+    # The cameras of a head stand beside each other.
+    order = [*frames]
+    shares = wai_shares(folder, content)
+    left, right = (order.index(f"{camera}/view_0000f.png") for camera in head)
+    assert shares[left, right] > 0.5
+    assert shares[right, left] > 0.5
 
 
 def test_points_of_both_sides_lie_on_the_same_surface(two, tmp_path):

@@ -63,8 +63,15 @@ EXPORTS = {
         "lichtfeld": {"points": 60, "depth": True, "format": "exr"},
         "ncore": {"points": 60},
         "poses_csv": {},
+        "wai": {},
     },
-    "shifted": {"colmap": {"points": 60}, "nerfstudio": {"points": 60}, "opendibr": {}, "miv": {}},
+    "shifted": {
+        "colmap": {"points": 60},
+        "nerfstudio": {"points": 60},
+        "opendibr": {},
+        "miv": {},
+        "wai": {},
+    },
     "fisheye": {
         "colmap": {"points": 60},
         "lichtfeld": {"points": 60, "depth": True},
@@ -431,7 +438,8 @@ def test_depth_agrees_where_a_set_has_its_views_as_png_too(dataset, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "kind", ["colmap", "nerfstudio", "nerf_synthetic", "opendibr", "miv", "lichtfeld", "hci"]
+    "kind",
+    ["colmap", "nerfstudio", "nerf_synthetic", "opendibr", "miv", "lichtfeld", "hci", "wai"],
 )
 @pytest.mark.parametrize("transparent", [False, True])
 def test_developed_and_transparent_pictures_show_their_views(transparent, kind, tmp_path):

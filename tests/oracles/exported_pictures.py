@@ -102,6 +102,7 @@ class _ShownView:
             return f"has no mask, but {self._count(~self.valid)} of the view show nothing"
         comparisons: dict[str, tuple[str, Callable[[Picture], Bools]]] = {
             "colour": ("colour", self._wrong_colours),
+            "opaque": ("colour", self._wrong_colours),
             "luma": ("luma", self._wrong_luma),
             "alpha": ("alpha", self._wrong_alpha),
             "mask": ("mask", self._wrong_mask),
@@ -144,12 +145,12 @@ class _ShownView:
     def encoded(self, picture: Picture) -> Floats:
         """Return the sRGB colour (height, width, 3), 0 to 1, as an export develops it.
 
-        Video has no alpha. There a transparent view is in front of black.
+        Some pictures have no alpha. There a transparent view is in front of black.
         """
         if self.is_encoded:
             return self.image.encoded
         light = self.image.colour.astype(np.float64)
-        if picture.kind != "luma":
+        if picture.kind not in ("luma", "opaque"):
             light /= np.where(self.alpha > 0, self.alpha, 1)[..., None]
         return np.asarray(encode_srgb(toned(light, *picture.development)))
 

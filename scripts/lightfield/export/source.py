@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import link_or_copy
+from lightfield.core.files import absolute_path, link_or_copy
 from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, in_16_bits
 from lightfield.geometry.lenses import Lens
@@ -60,6 +60,12 @@ class SourceDataset:
         if self.suffix == ".png":
             return None
         return Look.of(self.look_name, self.exposure, self.lightfield.content.get(FILE_LOOK))
+
+    @property
+    def scene_name(self) -> str:
+        """The scene's name, by the lightfield.json, or else by the folder of its datasets."""
+        folder = absolute_path(self.dataset).parent
+        return str(self.lightfield.content.get("scene", {}).get("name", folder.name))
 
     @property
     def rendered(self) -> LightField:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from lightfield.core.errors import UserError
-from lightfield.core.files import absolute_path, write_bytes, write_text
+from lightfield.core.files import write_bytes, write_text
 from lightfield.core.progress import Progress
 from lightfield.export import cameras
 from lightfield.export.source import Floats, SourceDataset
@@ -134,9 +134,6 @@ def parameters(
     """Return the text of parameters.cfg. ``baseline`` is in metres."""
     lens = source.lens
     assert isinstance(lens, Rectilinear)
-    scene = source.lightfield.content.get("scene", {}).get(
-        "name", absolute_path(source.dataset).parent.name
-    )
     center = zip(
         ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"),
         [*middle.position.tolist(), *middle.rotation.tolist()],
@@ -159,7 +156,7 @@ def parameters(
             "offset": 0.0,
         },
         "meta": {
-            "scene": scene,
+            "scene": source.scene_name,
             "category": "additional",
             "disp_min": min(disparities),
             "disp_max": max(disparities),

@@ -43,6 +43,7 @@ from oracles.readers import (
     scannetpp,
     scene_flow,
     splat,
+    wai,
 )
 from oracles.readers.contents import Exported
 
@@ -62,6 +63,7 @@ READERS = {
     "poses_csv": poses_csv.read,
     "scannetpp": scannetpp.read,
     "splat": splat.read,
+    "wai": wai.read,
 }
 
 WITHOUT_VIEWS = ("coco", "mesh", "point_cloud", "splat")

@@ -87,11 +87,12 @@ class Picture:
     - ``place``: where it is, for messages.
     - ``path``: the file. None for a mask that is missing: then all pixels count.
     - ``view``: the name of the view. None for the view nearest to ``position`` (3,).
-    - ``kind``: "colour" in sRGB, or the pixels of the view itself in EXR; "luma" of ``bits`` bits;
-      "alpha"; "mask" (0: ignored); "hidden" (0: not ignored). Of depth: "steps" of ``unit`` metres,
-      0 for none; "metres", 0 for none; "disparity", ``unit`` divided by the depth, 0 for none;
-      "relative", 65535 at the farthest surface, 0 for none; "levels" of normalised disparity of
-      ``bits`` bits between the two depths ``limits``, where depth has ``lowest`` at least.
+    - ``kind``: "colour" in sRGB, or the pixels of the view itself in EXR; "opaque", colour in sRGB
+      in front of black; "luma" of ``bits`` bits; "alpha"; "mask" (0: ignored); "hidden" (0: not
+      ignored). Of depth: "steps" of ``unit`` metres, 0 for none; "metres", 0 for none;
+      "disparity", ``unit`` divided by the depth, 0 for none; "relative", 65535 at the farthest
+      surface, 0 for none; "levels" of normalised disparity of ``bits`` bits between the two depths
+      ``limits``, where depth has ``lowest`` at least.
     - ``meaning``: which depth, "z" or "distance".
     - ``development``: exposure and white with which light becomes sRGB.
     - ``size``: width and height of a file without a header of its own.
