@@ -259,6 +259,79 @@ def test_nerf_synthetic_is_read_with_its_own_formula(dataset, tmp_path):
     assert len(names) == 12
 
 
+def at_depths(*depths):
+    """Return what to see for `write_views`: bands of rows from the top, each at one Z."""
+
+    def see(lens, matrix):
+        colour, _ = look(lens, matrix)
+        z = np.repeat(depths, lens.height // len(depths))[:, None]
+        return colour, z / -lens.pixel_rays()[..., 2]
+
+    return see
+
+
+def test_nerf_synthetic_says_how_many_surfaces_its_readers_do_not_sample(tmp_path, capsys):
+    """NeRF's run_nerf.py samples the Z from 2 to 6 of what blender's loader gives."""
+    folder = tmp_path / "dataset"
+    write_views(folder, LENSES["perspective"], RIG, see=at_depths(4, 20, 30, 40))
+    made = exported(folder, "nerf_synthetic", "views", tmp_path / "metres")
+    said = capsys.readouterr().err
+    assert f"warning: {made}: 75% of the surfaces are nearer than 2 or farther than 6" in said
+    assert "scale: 0.122 leaves 25%" in said
+    # 20, 30 and 40 m become 2.44, 3.66 and 4.88 units, and 4 m becomes 0.49.
+    scaled = exported(folder, "nerf_synthetic", "views", tmp_path / "scaled", scale=0.122)
+    assert f"{scaled}: 25% of the surfaces are" in capsys.readouterr().err
+    for part in ("train", "val", "test"):
+        content, small = (
+            json.loads((path / f"transforms_{part}.json").read_text()) for path in (made, scaled)
+        )
+        assert small["camera_angle_x"] == content["camera_angle_x"]
+        for frame, small_frame in zip(content["frames"], small["frames"], strict=True):
+            assert small_frame["file_path"] == frame["file_path"]
+            matrix, small_matrix = (np.array(f["transform_matrix"]) for f in (frame, small_frame))
+            np.testing.assert_array_equal(small_matrix[:3, :3], matrix[:3, :3])
+            np.testing.assert_allclose(small_matrix[:3, 3], 0.122 * matrix[:3, 3], rtol=1e-15)
+    options = [json.loads((path / "export.json").read_text())["options"] for path in (made, scaled)]
+    assert options[1] == options[0] | {"scale": 0.122}
+
+
+def test_nerf_synthetic_does_not_warn_of_surfaces_that_its_readers_sample(tmp_path, capsys):
+    write_views(tmp_path / "dataset", LENSES["perspective"], RIG, see=at_depths(2.1, 5.9))
+    exported(tmp_path / "dataset", "nerf_synthetic", "views", tmp_path)
+    assert "warning" not in capsys.readouterr().err
+    exported(tmp_path / "dataset", "nerf_synthetic", "views", tmp_path / "far", scale=10)
+    assert "100% of the surfaces" in capsys.readouterr().err
+
+
+def test_nerfbaselines_finds_its_lists_and_a_mask_of_every_image(dataset, tmp_path):
+    """Follows load_colmap_dataset in nerfbaselines' datasets/colmap.py."""
+    shutil.copytree(dataset, tmp_path / "dataset")
+    path = tmp_path / "dataset" / "split" / "view_0003f.exr"
+    image = images.read_image(path)
+    depth = image.channels["Z"].copy()
+    depth[:5] = np.nan
+    images.write_exr(path, image.channels | {"Z": depth}, image.attributes)
+    folder = exported(tmp_path / "dataset", "nerfbaselines", "split", tmp_path, points=50)
+    info = json.loads((folder / "nb-info.json").read_text())
+    assert info == {"loader": "colmap", "id": "plenoforge", "scene": "dataset"}
+    model = pycolmap.Reconstruction(folder / "sparse/0")
+    names = {image.name for image in model.images.values()}
+    train, test = (
+        (folder / f"{part}_list.txt").read_text().splitlines() for part in ("train", "test")
+    )
+    assert sorted(train + test) == sorted(names)
+    assert test == [f"view_{number:04d}f.png" for number in range(1, 12, 2)]
+    for name in names:
+        assert (folder / "images" / name).is_file()
+        mask = cv2.imread(str((folder / "masks" / name).with_suffix(".png")), cv2.IMREAD_GRAYSCALE)
+        empty = np.zeros((48, 64), bool)
+        empty[:5] = name == "view_0003f.png"
+        np.testing.assert_array_equal(mask == 0, empty)
+    whole = exported(tmp_path / "dataset", "nerfbaselines", "perspective", tmp_path, points=50)
+    # With a folder of masks, nerfbaselines would read one for each image.
+    assert not (whole / "masks").exists()
+
+
 def of_disparity(levels, camera, bits):
     near, far = camera["Depth_range"]
     return 1 / (1 / far + levels / (2**bits - 1) * (1 / near - 1 / far))
@@ -1016,6 +1089,8 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
             "is a part of a panorama",
         ),
         ("nerfstudio", "views", VIEWS, {"splatfacto": True}, "taken for a pinhole by splatfacto"),
+        ("nerfbaselines", "views", LENSES["fisheye"], {}, "nerfbaselines does not find; reproject"),
+        ("nerfbaselines", "views", OTHERS["three_radial"], {}, "has k3 to k6"),
         ("nerf_synthetic", "views", VIEWS, {}, "is not a pinhole camera"),
         ("nerf_synthetic", "views", LENSES["shifted"] | {"sensor_size": 36}, {}, "off centre"),
         ("opendibr", "views", VIEWS | {"principal_point": [40, 48]}, {}, "axis off centre"),

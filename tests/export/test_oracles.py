@@ -56,6 +56,7 @@ EXPORTS = {
         "colmap": {"format": "text", "points": 60, "depth": True},
         "nerfstudio": {"points": 60, "depth": True},
         "nerf_synthetic": {},
+        "nerfbaselines": {"points": 60},
         "opendibr": {},
         "miv": {},
         "hci": {},
@@ -84,6 +85,7 @@ EXPORTS = {
         "colmap": {"format": "text", "points": 60, "depth": True},
         "nerfstudio": {"points": 60, "depth": True},
         "ncore": {"points": 60},
+        "nerfbaselines": {"points": 60},
     },
     "aria": {"colmap": {"points": 60}, "nerfstudio": {"points": 60, "depth": True}},
     "half": {"opendibr": {}, "miv": {}},
@@ -91,6 +93,8 @@ EXPORTS = {
     "split": {
         "colmap": {"format": "text", "points": 60},
         "lichtfeld": {"points": 60},
+        "nerfbaselines": {"points": 60},
+        "nerf_synthetic": {"scale": 0.7},
         "nerfstudio": {"points": 60},
     },
 }
@@ -349,7 +353,7 @@ def test_without_a_split_a_parts_list_has_all_views(tmp_path):
 
 
 # Exports that hold the views of other rigs, too.
-OF_RIGS = ("colmap", "nerfstudio", "nerf_synthetic", "lichtfeld", "ncore")
+OF_RIGS = ("colmap", "nerfbaselines", "nerfstudio", "nerf_synthetic", "lichtfeld", "ncore")
 
 
 @pytest.fixture(scope="module")

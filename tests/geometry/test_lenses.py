@@ -2,6 +2,7 @@
 
 import json
 import math
+import pickle
 import shutil
 import subprocess
 import sys
@@ -304,6 +305,16 @@ def test_lenses_of_colmap_have_its_pixels_and_rays(name: str) -> None:
     seen = theta < inverted_to
     back = camera.cam_ray_from_img(expected[seen]) * [1, -1, -1]
     assert angle(lens.rays(*expected[seen].T), back).max() < 1e-10
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_a_lens_that_was_used_goes_to_another_process(name: str) -> None:
+    lens = EXAMPLES[name].fitted(48)
+    rays = lens.pixel_rays()
+    lens.pixels(rays)
+    sent = pickle.loads(pickle.dumps(lens))
+    assert sent == lens
+    np.testing.assert_array_equal(sent.pixel_rays(), rays)
 
 
 @pytest.mark.parametrize("name", [name for name in EXAMPLES if name.startswith("rectilinear")])

@@ -22,8 +22,7 @@ _BLUR = 0.3  # pixel²
 _STEP = 1e-4
 # gsplat linearises a perspective projection at most this much beyond the image's edge, in widths.
 _BEYOND = 0.15
-# A pixel shows a surface if Gaussians cover more than this part of it.
-_COVERED = 0.5
+_HALF = 0.5
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,8 @@ class Drawn:
 
     - ``colour``: sRGB-encoded, (h, w, 3).
     - ``coverage``: the part (h, w) of each pixel that Gaussians cover.
-    - ``distance``: the mean of their distances (h, w) in metres, weighted by what they add to the
-      pixel. inf where they cover less than half of it.
+    - ``distance``: the distance (h, w) in metres up to which Gaussians cover half of the pixel. inf
+      where they never do. A mean would mix a surface with what shows through it.
     """
 
     colour: Floats
@@ -58,22 +57,22 @@ def draw(gaussians: Gaussians, view: View, lens: Lens) -> Drawn:
     order = np.argsort(along[visible], kind="stable")
     offset = gaussians.positions[visible] - view.world_from_camera[:3, 3]
     shades = _colours(gaussians.harmonics[visible], offset)
-    drawn = np.zeros((lens.height, lens.width, 4))
+    colour = np.zeros((lens.height, lens.width, 3))
+    distance = np.full((lens.height, lens.width), np.inf)
     transmitted = np.ones((lens.height, lens.width))
     opaque = np.zeros((lens.height, lens.width), bool)
     _blend(
         lens.pixels(local)[order],
         covariance[order],
-        np.column_stack([shades, away[visible]])[order],
+        shades[order],
+        away[visible][order],
         gaussians.opacities[visible][order],
-        drawn,
+        colour,
+        distance,
         transmitted,
         opaque,
     )
-    coverage = 1 - transmitted
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(coverage > _COVERED, drawn[..., 3] / coverage, np.inf)
-    return Drawn(drawn[..., :3], coverage, mean)
+    return Drawn(colour, 1 - transmitted, distance)
 
 
 def _matrices(quaternions: Floats) -> Floats:
@@ -151,17 +150,18 @@ def _basis(direction: Floats) -> Floats:
 def _blend(
     pixels: Array,
     covariance: Array,
-    values: Array,
+    shades: Array,
+    away: Array,
     opacities: Array,
-    drawn: Array,
+    colour: Array,
+    distance: Array,
     transmitted: Array,
     opaque: Array,
 ) -> None:
-    """Add Gaussians to ``drawn`` (h, w, 4), from the nearest on.
+    """Add the ``shades`` (n, 3) of Gaussians to ``colour`` (h, w, 3), from the nearest on.
 
-    ``values`` (n, 4) are colours and distances. ``transmitted`` (h, w) is the part of the light
-    that passes through. A pixel is ``opaque`` (h, w) before less than 1e-4 passes. A Gaussian is
-    left out where it covers less than 1 / 255.
+    ``transmitted`` (h, w) is the part of the light that passes through. A pixel is ``opaque``
+    (h, w) before less than 1e-4 passes. A Gaussian is left out where it covers less than 1 / 255.
     """
     height, width = transmitted.shape
     for n in range(len(pixels)):
@@ -190,6 +190,8 @@ def _blend(
                 if rest <= 1e-4:
                     opaque[i, j] = True
                     continue
-                for k in range(4):
-                    drawn[i, j, k] += alpha * transmitted[i, j] * values[n, k]
+                for k in range(3):
+                    colour[i, j, k] += alpha * transmitted[i, j] * shades[n, k]
+                if transmitted[i, j] > _HALF >= rest:
+                    distance[i, j] = away[n]
                 transmitted[i, j] = rest

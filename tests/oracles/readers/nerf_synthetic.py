@@ -1,6 +1,7 @@
 """NeRF's synthetic layout, read as the original NeRF's load_blender.py does.
 
-Poses are in the axes of lightfield.json. A list describes the lens by its horizontal angle only.
+Poses are in the axes of lightfield.json, and in metres times the export's scale. A list describes
+the lens by its horizontal angle only.
 """
 
 import math
@@ -44,6 +45,7 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
                     exported.add_picture(picture, view, "colour", development=colours)
                     exported.add_picture(picture, view, "alpha")
                     matrix = numbers(frame["transform_matrix"], (4, 4))
+                    matrix[:3, 3] /= options.get("scale", 1)
                     exported.views.append(ExportedView(path, place, view, matrix))
         exported.parts.append(Part(str(path), name, names))
     return exported

@@ -156,6 +156,10 @@ class Lens(ABC):
                 f"principal_point: {list(self.center)} must be finite pixels, below 1e99"
             )
 
+    def __getstate__(self) -> dict[str, Any]:
+        # What was computed from the fields may hold functions, which go to no other process.
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
     @property
     def sensor(self) -> Pair:
         """The sensor's width and height in mm."""
