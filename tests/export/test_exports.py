@@ -655,7 +655,7 @@ def test_an_ncore_sequence_shows_its_points_where_the_views_see_them(dataset, tm
     directions = store.array(f"{frame}/ray_bundle/direction").astype(float)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-6)
     points = directions * store.array(f"{frame}/ray_bundle_returns/distance_m")[0][:, None]
-    assert 100 < len(points) <= 400
+    assert len(points) == 400
     on_sphere(points, 1e-5)
     np.testing.assert_allclose(store.array(f"{frame}/generic_data/rgb"), colour_of(points), atol=6)
     poses = store.attributes("poses/default/dynamic_poses")["('camera', 'world')"]
