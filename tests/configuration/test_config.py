@@ -13,7 +13,7 @@ import yaml
 from mistakes import REMOVE, RIGHT, changed
 from pydantic import ValidationError
 
-from lightfield.configuration import config_file, json_schema, scene_yaml
+from lightfield.configuration import config_file, json_schema, keys, scene_yaml
 from lightfield.configuration.config_file import Preset
 from lightfield.core.errors import UserError
 from lightfield.core.names import ROOT
@@ -241,6 +241,27 @@ def test_each_rig_has_the_exports_that_name_it():
     settings = job_settings.export(first, first.exports.hci, "views").as_json()
     assert "rigs" not in settings["options"]
     assert "rigs" not in first.exports.hci.recorded
+
+
+def test_another_choice_of_points_runs_again_only_exports_with_a_number_of_points(monkeypatch):
+    camera = {"lens": "rectilinear", "fov": 60, "resolution": [8, 8]}
+    rig = {"type": "plane", "cameras": [2, 2], "camera": camera}
+    rig |= {"frames": {"first": 1, "last": 2}}
+    with_number = {"colmap", "nerfstudio", "ncore", "lichtfeld", "dnerf", "colmap_frames"}
+    names = [*with_number, "splat", "nerf_synthetic", "point_cloud", "poses_csv"]
+    content = {"scene": {"builder": "room"}, "render": {"samples": 1}, "rigs": {"flat": rig}}
+    content["exports"] = {name: {"sources": ["views"]} for name in names}
+    written = scene_yaml.Scene.model_validate(content)
+    first, _ = datasets_of("mixed", written, "full", Preset(), {})
+
+    def settings():
+        exports = first.exports.selected.items()
+        return {name: job_settings.export(first, each, "views").as_json() for name, each in exports}
+
+    before = settings()
+    monkeypatch.setitem(keys.VERSIONS, "points", keys.VERSIONS["points"] + 1)
+    after = settings()
+    assert {name for name in before if before[name] != after[name]} == with_number
 
 
 def test_an_export_for_training_is_of_a_whole_split():

@@ -106,7 +106,7 @@ def test_colmap_reads_the_cameras_and_projects_the_points(dataset, tmp_path, sou
     assert_has_the_cameras_of(model, *views_of(dataset / source))
     assert {camera.model_name for camera in model.cameras.values()} == {MODELS[source]}
     assert_projects_its_points(model)
-    assert 100 < len(model.points3D) <= 400
+    assert len(model.points3D) == 400
     for point in model.points3D.values():
         on_sphere(point.xyz, 1e-5)
         np.testing.assert_allclose(point.color, colour_of(point.xyz), atol=6)

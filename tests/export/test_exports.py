@@ -282,6 +282,10 @@ def test_nerf_synthetic_says_how_many_surfaces_its_readers_do_not_sample(tmp_pat
     said = capsys.readouterr().err
     assert f"warning: {made}: 75% of the surfaces are nearer than 2 or farther than 6" in said
     assert "scale: 0.122 leaves 25%" in said
+    # A PNG has no depth, but its rendered view does.
+    write_views(folder / "png", LENSES["perspective"], RIG, ".png", at_depths(4, 20, 30, 40))
+    exported(folder, "nerf_synthetic", "png", tmp_path)
+    assert "75% of the surfaces" in capsys.readouterr().err
     # 20, 30 and 40 m become 2.44, 3.66 and 4.88 units, and 4 m becomes 0.49.
     scaled = exported(folder, "nerf_synthetic", "views", tmp_path / "scaled", scale=0.122)
     assert f"{scaled}: 25% of the surfaces are" in capsys.readouterr().err
@@ -297,6 +301,16 @@ def test_nerf_synthetic_says_how_many_surfaces_its_readers_do_not_sample(tmp_pat
             np.testing.assert_allclose(small_matrix[:3, 3], 0.122 * matrix[:3, 3], rtol=1e-15)
     options = [json.loads((path / "export.json").read_text())["options"] for path in (made, scaled)]
     assert options[1] == options[0] | {"scale": 0.122}
+
+
+@pytest.mark.parametrize("missing", ["lightfield.json", "exr/view_0002f.exr"])
+def test_nerf_synthetic_needs_no_rendered_views_for_a_reprojection(dataset, tmp_path, missing):
+    shutil.copytree(dataset / "exr", tmp_path / "dataset/exr")
+    shutil.copytree(dataset / "png", tmp_path / "dataset/png")
+    shutil.copyfile(dataset / "lightfield.json", tmp_path / "dataset/lightfield.json")
+    (tmp_path / "dataset" / missing).unlink()
+    folder = exported(tmp_path / "dataset", "nerf_synthetic", "png", tmp_path)
+    assert len([*folder.glob("*/*.png")]) == 12
 
 
 def test_nerf_synthetic_does_not_warn_of_surfaces_that_its_readers_sample(tmp_path, capsys):
@@ -641,7 +655,7 @@ def test_an_ncore_sequence_shows_its_points_where_the_views_see_them(dataset, tm
     directions = store.array(f"{frame}/ray_bundle/direction").astype(float)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-6)
     points = directions * store.array(f"{frame}/ray_bundle_returns/distance_m")[0][:, None]
-    assert 100 < len(points) <= 400
+    assert len(points) == 400
     on_sphere(points, 1e-5)
     np.testing.assert_allclose(store.array(f"{frame}/generic_data/rgb"), colour_of(points), atol=6)
     poses = store.attributes("poses/default/dynamic_poses")["('camera', 'world')"]

@@ -118,6 +118,25 @@ def test_colmap_reads_one_rig_whose_frames_have_all_cameras(three, tmp_path, for
     on_sphere(np.array([point.xyz for point in model.points3D.values()]), 1e-5)
 
 
+def test_nerfbaselines_lists_the_images_of_all_cameras_of_a_head(tmp_path):
+    head = {name: HEAD["left"] | {"position": [x, 0, 0]} for name, x in (("l", -0.1), ("r", 0.1))}
+    head["r"] |= {"camera": LENSES["shifted"]}
+    folders = datasets(tmp_path, head)
+    folder = exported(folders, "nerfbaselines", tmp_path / "out", points=50)
+    train, test = (
+        (folder / f"{part}_list.txt").read_text().splitlines() for part in ("train", "test")
+    )
+    assert test
+    assert sorted(train + test) == sorted(views_of(folders, head))
+    model = pycolmap.Reconstruction(folder / "sparse/0")
+    for image in model.images.values():
+        picture = cv2.imread(str(folder / "images" / image.name))
+        camera = lenses.from_camera(head[image.name[0]]["camera"])
+        assert picture.shape[:2] == (camera.height, camera.width)
+        center = (image.camera.principal_point_x, image.camera.principal_point_y)
+        assert center == pytest.approx(camera.center)
+
+
 def test_colmap_writes_the_rig_as_colmap_itself_does(three, tmp_path):
     ours = exported(three, "colmap", tmp_path / "ours", points=50) / "sparse/0"
     model = pycolmap.Reconstruction(ours)

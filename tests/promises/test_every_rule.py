@@ -674,13 +674,13 @@ ROUNDS = {
         "built": ("size: 0.5", "size: 2", {"LFInner lightfield", "measure_synthesis"}),
     },
 }
-# The first two follow from the programs' versions, the third from the place of the scene YAML. Only
-# a .blend's camera has frames. Only instant-ngp places a rig that tests like the trained one; other
+# Versions and bpy follow from the programs, and commands from the place of the scene YAML. Only a
+# .blend's camera has frames. Only instant-ngp places a rig that tests like the trained one; other
 # formats take its views. No scene YAML asks reproject.py for masks, or sets the number of compared
 # synthesised views. A scene with another name is another scene. A panorama has no neighbour.
-CONSTANT = {"version", "spread_version", "bpy", "command", "camera_frames", "reproject.json mask"}
-CONSTANT |= {"synthesis.json views", "lightfield.json scene", "panorama.json scene"}
-CONSTANT |= {"probes.json scene", "panorama.json flow"}
+CONSTANT = {"version", "spread_version", "points_version", "bpy", "command", "camera_frames"}
+CONSTANT |= {"reproject.json mask", "synthesis.json views", "lightfield.json scene"}
+CONSTANT |= {"panorama.json scene", "probes.json scene", "panorama.json flow"}
 # The sequence is of rendered views, and no other rig tests it.
 CONSTANT |= {"dnerf.json suffix", "dnerf.json tested_by"}
 CONSTANT |= {"nerfstudio.json trained_by", "instant_ngp.json tested_by"}

@@ -54,6 +54,8 @@ VERSIONS = {
     "import": 4,
     # The choice of spread test views. Views keep their keys.
     "spread": 1,
+    # The choice of the points of exports that have a number of them. Views keep their keys.
+    "points": 1,
 }
 
 

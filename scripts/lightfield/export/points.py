@@ -1,6 +1,6 @@
 """Lifts evenly spread world points from the views' depth, and finds the views that see them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +16,15 @@ from lightfield.reading.surface import SeenSurface
 
 # Lift this many candidates for each point, and keep an even selection of them.
 _CANDIDATES = 8
+# Lift more of them if fewer than this part of them were found.
+_ENOUGH = 0.5
+# The sides of cells grow by this factor from one distance to the next, so the density of points, as
+# cameras see them, varies by its square.
+_GROWTH = 2**0.5
+# Distances from cameras are at least this long, in metres.
+_LEAST_DISTANCE = 1e-6
+# The largest side of a cell, in distances from the nearest camera. A few of them hold all points.
+_LARGEST_CELL = 4.0
 # Integers up to this size are exact as floats.
 _LARGEST_INTEGER = 2**53
 
@@ -32,6 +41,9 @@ class Points:
         return Points(self.positions[which], self.colours[which], self.normals[which])
 
 
+_NO_POINTS = Points(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.empty((0, 3)))
+
+
 @dataclass(frozen=True)
 class Observations:
     """Where one view sees points: their indices (m,) and their pixel coordinates (m, 2)."""
@@ -41,32 +53,52 @@ class Observations:
 
 
 def lift(source: SourceDataset, count: int | None = None, voxel: float | None = None) -> Points:
-    """Lift points from depth: about ``count``, or one in each ``voxel`` metres.
+    """Lift points from depth: ``count`` by `evenly_seen`, one in each ``voxel`` metres, or all.
 
     Points come from all views, or from the training views if the rig has a split. Each point has
-    the colour that its view shows there.
+    the colour that its view shows there. If the views hold fewer different points than ``count``,
+    returns them all.
     """
     all_views = source.lightfield.views
     views = [view for view in all_views if view.split in (None, "train")] or all_views
-    size = source.rendered.lens.width * source.rendered.lens.height
-    points_a_view = _CANDIDATES * count / len(views) if count else size
-    step = max(1, int((size / points_a_view) ** 0.5))
-    progress = Progress(len(views), "points", "views")
-    kept: Points | None = None
-    for view, surface in source.surfaces(views):
-        points = _points_of(source, view, surface, step)
+    if count:
+        points = _candidates(source, views, count)
+        cameras = np.array([view.position for view in views])
+        return points.chosen(evenly_seen(points.positions, cameras, count))
+    kept = _NO_POINTS
+    for points in _lifted(source, views, step=1):
+        kept = joined([kept, points])
         # With a voxel, memory does not grow with the number of views.
-        kept = joined([kept, points]) if kept else points
         if voxel:
             kept = kept.chosen(one_a_voxel(kept.positions, voxel))
+    return kept
+
+
+def _candidates(source: SourceDataset, views: Sequence[View], count: int) -> Points:
+    """Lift several points for each of ``count``, evenly over the pixels of the ``views``."""
+    wanted = _CANDIDATES * count
+    pixels = len(views) * source.rendered.lens.width * source.rendered.lens.height
+    step = max(1, int((pixels / wanted) ** 0.5))
+    while True:
+        points = joined([_NO_POINTS, *_lifted(source, views, step)])
+        share = len(points.positions) / wanted
+        # Pixels of the sky, and pixels outside the views' frame, give no point.
+        if step == 1 or share > _ENOUGH:
+            return points
+        step = max(1, min(step - 1, round(step * share**0.5)))
+
+
+def _lifted(source: SourceDataset, views: Sequence[View], step: int) -> Iterator[Points]:
+    """Yield the points of each view at every ``step``-th pixel."""
+    progress = Progress(len(views), "points", "views")
+    for view, surface in source.surfaces(views):
+        yield _points_of(source, view, surface, step)
         progress.done()
-    assert kept
-    return kept.chosen(evenly(kept.positions, count)) if count else kept
 
 
 def lift_one_each(source: SourceDataset, views: Sequence[View]) -> Points:
     """Lift one point from each of the ``views`` that has any finite depth."""
-    parts = [Points(np.empty((0, 3)), np.empty((0, 3), np.uint8), np.empty((0, 3)))]
+    parts = [_NO_POINTS]
     for view, surface in source.surfaces(views):
         points = _points_of(source, view, surface, step=1)
         middle = len(points.positions) // 2
@@ -136,7 +168,48 @@ def evenly(positions: Floats, count: int) -> NDArray[np.intp]:
     different = np.sort(np.unique(positions, axis=0, return_index=True)[1])
     if len(different) <= count:
         return different
-    return one_a_voxel(positions, _voxel_for(positions, count))
+    extent = float(np.max(positions.max(axis=0) - positions.min(axis=0)))
+    _, side = _sides_around(
+        count, extent, 0.01, lambda side: len(np.unique(_cells(positions, side), axis=0))
+    )
+    return one_a_voxel(positions, side)
+
+
+def evenly_seen(positions: Floats, cameras: Floats, count: int) -> NDArray[np.intp]:
+    """Return the indices of ``count`` different ``positions`` (n, 3), evenly spread for cameras.
+
+    Cells that hold one position each are the larger, the farther they are from the nearest of the
+    ``cameras`` (m, 3). So positions are evenly spread over the angles that the cameras see. If
+    fewer than ``count`` are different, returns all of these.
+    """
+    different = np.sort(np.unique(positions, axis=0, return_index=True)[1])
+    if len(different) <= count:
+        return different
+    shells = _shells(positions, cameras)
+    side, _ = _sides_around(
+        count, _LARGEST_CELL, 0.001, lambda side: len(_one_a_cell(positions, shells, side))
+    )
+    kept = _one_a_cell(positions, shells, side)
+    picked = np.linspace(0, len(kept) - 1, count).round().astype(int)
+    return np.asarray(kept[picked], np.intp)
+
+
+def _shells(positions: Floats, cameras: Floats) -> list[tuple[float, NDArray[np.intp]]]:
+    """Return the indices of the ``positions`` at about each distance from the nearest camera."""
+    # Only here, because it loads slowly, and exporters are imported whenever a YAML is read.
+    from scipy.spatial import cKDTree
+
+    distance = np.maximum(cKDTree(cameras).query(positions)[0], _LEAST_DISTANCE)
+    steps = np.floor(np.log(distance) / np.log(_GROWTH))
+    return [(float(_GROWTH**step), np.flatnonzero(steps == step)) for step in np.unique(steps)]
+
+
+def _one_a_cell(
+    positions: Floats, shells: Sequence[tuple[float, NDArray[np.intp]]], side: float
+) -> NDArray[np.intp]:
+    """Return the index of the first position in each cell, of ``side`` times its distance."""
+    kept = [among[one_a_voxel(positions[among], side * away)] for away, among in shells]
+    return np.sort(np.concatenate(kept))
 
 
 def one_a_voxel(positions: Floats, voxel: float) -> NDArray[np.intp]:
@@ -162,14 +235,18 @@ def _cells(positions: Floats, voxel: float) -> Floats:
     return np.asarray((row * columns + column) * layers + layer)
 
 
-def _voxel_for(positions: Floats, count: int) -> float:
-    """Return the side of voxels so that at most ``count`` of them hold points, to a percent."""
-    low = 0.0
-    high = float(np.max(positions.max(axis=0) - positions.min(axis=0)))
-    while high - low > 0.01 * high:
+def _sides_around(
+    count: int, largest: float, part: float, cells: Callable[[float], int]
+) -> tuple[float, float]:
+    """Return two sides of cells, close to one another: more than ``count`` hold points, or not.
+
+    ``cells`` returns how many of a side hold points. ``part`` says how close, of the larger side.
+    """
+    low, high = 0.0, largest
+    while high - low > part * high:
         middle = (low + high) / 2
-        if len(np.unique(_cells(positions, middle), axis=0)) > count:
+        if cells(middle) > count:
             low = middle
         else:
             high = middle
-    return high
+    return low, high

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path, link_or_copy
-from lightfield.formats.lightfield import LightField, View
+from lightfield.formats.lightfield import NAME, LightField, View
 from lightfield.geometry.depth import LARGEST_STEP, in_16_bits
 from lightfield.geometry.lenses import Lens
 from lightfield.imaging import images
@@ -71,6 +71,14 @@ class SourceDataset:
     def rendered(self) -> LightField:
         """The rendered views, which hold the depth of every surface."""
         return self._rendered[0]
+
+    @property
+    def has_surfaces(self) -> bool:
+        """Whether the rendered views are there and hold depth, as `surfaces` needs."""
+        if not all((folder / NAME).is_file() for folder in (self.dataset, *self.beside.values())):
+            return False
+        lightfield, views = self._rendered
+        return lightfield.depth is not None and all(view.path.is_file() for view in views.values())
 
     @cached_property
     def _shown(self) -> tuple[LightField, dict[str, OpenView]]:

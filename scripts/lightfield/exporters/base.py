@@ -259,6 +259,9 @@ class ExportSettings(ReaderSettings, Generic[Options]):
     spread_version: int | None = cause(
         "Version of the choice of test views, if the rig has no split."
     )
+    points_version: int | None = cause(
+        "Version of the choice of points, if the export has a number of them."
+    )
     look_source: str | None = cause(
         "Version of bpy and SHA-256 of its config.ocio, if there is a look."
     )

@@ -89,8 +89,8 @@ class NerfSynthetic(ForTraining):
 
 
 def _depths(source: SourceDataset, lens: Rectilinear) -> Floats:
-    """Return the Z in metres of the surfaces in all views' frames. None of views without depth."""
-    if source.rendered.depth is None:
+    """Return the Z in metres of the surfaces in all views' frames, as far as they are known."""
+    if not source.has_surfaces:
         return np.empty(0)
     surfaces = source.surfaces(source.lightfield.views)
     return np.concatenate([llff.depths(lens, view, surface) for view, surface in surfaces])

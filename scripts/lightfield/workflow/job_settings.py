@@ -383,6 +383,7 @@ def _export_settings(
         options=options.model_copy(update={"sources": [source]}),
         suffix=".exr" if source == VIEWS else dataset.reprojections[source].suffix,
         spread_version=keys.VERSIONS["spread"] if _chooses_tests(dataset, options) else None,
+        points_version=keys.VERSIONS["points"] if hasattr(options, "points") else None,
         look_source=blender_looks.source_of(getattr(options, "look", None)),
         **roles,
     )
