@@ -39,7 +39,7 @@ from lightfield.exporters.base import Developed, Export, ForTraining
 from lightfield.formats import render_block, sensors
 from lightfield.geometry import boards, inertia, rigs
 from lightfield.geometry.lenses import LENSES
-from lightfield.geometry.lenses.calibration_settings import CalibrationSettings
+from lightfield.geometry.lenses.calibration_settings import LensFileSettings
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.geometry.rigs import mount, path, rig, split_setting
 from lightfield.settings.base import MEANINGS
@@ -111,7 +111,7 @@ RIG_MODELS = _models(rigs.AnyRig)
 LENS_MODELS: list[type[BaseModel]] = [
     *[lens.Settings for lens in LENSES.values() if lens.Settings],
     FileSettings,
-    CalibrationSettings,
+    LensFileSettings,
 ]
 
 # The pages of keys, by the names of their files.
@@ -179,7 +179,7 @@ KEY_PAGES: dict[str, Page] = {
             Section("All rigs", rig.Rig),
             Section("frames", rig.Frames),
             Section("stereo", rig.Stereo),
-            Section("A camera of a head", mount.HeadCamera),
+            Section("A camera of a head", mount.HeadCameraSettings),
             Section("split", split_setting.Chosen),
         ],
     ),

@@ -11,7 +11,7 @@ from lightfield.geometry.lenses import Lens
 
 
 @dataclass(frozen=True)
-class Sensor:
+class HeadSensor:
     """A camera that takes some of the views. ``mount`` is its place in the head, if it is in one.
 
     ``views`` are in the order of the source. In a head, they are named <camera>/<view>.
@@ -42,7 +42,7 @@ def by_camera(source: SourceDataset) -> SourceDataset:
     return replace(source, renamed=names)
 
 
-def sensors(source: SourceDataset) -> list[Sensor]:
+def sensors(source: SourceDataset) -> list[HeadSensor]:
     """Return the cameras of a source that `by_camera` returned, in the order of their views."""
     mounts = _mounts(source)
     views: dict[Lens | str, list[View]] = {}
@@ -50,18 +50,18 @@ def sensors(source: SourceDataset) -> list[Sensor]:
         lens = source.view(view).lens
         views.setdefault(mounts[view.name].name if mounts else lens, []).append(view)
     return [
-        Sensor(source.view(first).lens, mounts.get(first.name), [first, *others])
+        HeadSensor(source.view(first).lens, mounts.get(first.name), [first, *others])
         for first, *others in views.values()
     ]
 
 
-def places(cameras: Sequence[Sensor]) -> list[list[View]]:
+def places(cameras: Sequence[HeadSensor]) -> list[list[View]]:
     """Return the views of a head's cameras at each place of its body."""
     by_place = [camera.views_by_place for camera in cameras]
     return [[views[name] for views in by_place] for name in by_place[0]]
 
 
-def from_first(cameras: Sequence[Sensor]) -> list[Floats]:
+def from_first(cameras: Sequence[HeadSensor]) -> list[Floats]:
     """Return the matrix (4, 4) from each camera of a head to the first, in metres.
 
     Empty for cameras that are no head.

@@ -76,7 +76,7 @@ class Kalibr(Joined):
         write_text(folder / "camchain.yaml", text)
 
 
-class _Model(NamedTuple):
+class _KalibrModel(NamedTuple):
     """A lens in Kalibr's words. ``parameters`` stand before the focal lengths."""
 
     projection: str
@@ -85,28 +85,28 @@ class _Model(NamedTuple):
     coefficients: Sequence[float]
 
 
-def _model(lens: Lens) -> _Model | None:
+def _model(lens: Lens) -> _KalibrModel | None:
     """Return Kalibr's model of a lens. None for a lens that it lacks."""
     match lens:
         case Rectilinear():
-            return _Model("pinhole", (), "radtan", (0.0,) * _RADTAN)
+            return _KalibrModel("pinhole", (), "radtan", (0.0,) * _RADTAN)
         case BrownConrady():
-            return _Model("pinhole", (), "radtan", lens.coefficients[:_RADTAN])
+            return _KalibrModel("pinhole", (), "radtan", lens.coefficients[:_RADTAN])
         case Equidistant() | KannalaBrandt():
             _, _, *coefficients = cameras.opencv_fisheye(lens)
-            return _Model("pinhole", (), "equidistant", coefficients)
+            return _KalibrModel("pinhole", (), "equidistant", coefficients)
         case FovModel():
-            return _Model("pinhole", (), "fov", lens.coefficients)
+            return _KalibrModel("pinhole", (), "fov", lens.coefficients)
         case DoubleSphere():
-            return _Model("ds", lens.coefficients, "none", ())
+            return _KalibrModel("ds", lens.coefficients, "none", ())
         case ExtendedUnified():
-            return _Model("eucm", lens.coefficients, "none", ())
+            return _KalibrModel("eucm", lens.coefficients, "none", ())
         case Unified():
-            return _Model("omni", lens.coefficients, "none", ())
+            return _KalibrModel("omni", lens.coefficients, "none", ())
     return None
 
 
-def _camera(sensor: heads.Sensor, number: int) -> dict[str, Any]:
+def _camera(sensor: heads.HeadSensor, number: int) -> dict[str, Any]:
     """Return the keys of a camera."""
     lens = sensor.lens
     model = _model(lens)

@@ -113,7 +113,7 @@ class _Stream:
     is_rolling: bool
 
     @classmethod
-    def of(cls, source: SourceDataset, sensor: heads.Sensor, number: int) -> "_Stream":
+    def of(cls, source: SourceDataset, sensor: heads.HeadSensor, number: int) -> "_Stream":
         """Return the stream of a source's camera. In a head, equal times are equal places."""
         rows = _row_times(source, sensor.lens)
         views = sorted(sensor.views, key=lambda view: view.name)

@@ -179,7 +179,7 @@ class Checkerboard(Board):
 
 
 class Chessboard(Checkerboard):
-    """A chessboard. Its corners are those of cv2.findChessboardCorners."""
+    """A chessboard. Its corners are the ones that cv2.findChessboardCorners finds."""
 
     type: Literal["chessboard"]
 

@@ -64,7 +64,7 @@ class Pictures:
 
 
 @dataclass(frozen=True)
-class Render:
+class ShownRender:
     """A picture to compare with a view.
 
     - ``name``: for messages and errors.
@@ -148,7 +148,7 @@ def truth(source: SourceDataset, view: View, largest: int | None, background: Fl
     )
 
 
-def rendered(path: Path, source: SourceDataset, background: Floats) -> Render:
+def rendered(path: Path, source: SourceDataset, background: Floats) -> ShownRender:
     """Return the render in a file, over a background (3,) in sRGB, 0 to 1.
 
     Raises `UserError` if it has no colour, or another size than the dataset's.
@@ -162,7 +162,7 @@ def rendered(path: Path, source: SourceDataset, background: Floats) -> Render:
     depth = image.channels.get("Z")
     normals = _normals(path.parent / _NORMALS / f"{path.stem}.exr", source)
     kind = image.channels["R"].dtype
-    return Render(
+    return ShownRender(
         str(path),
         Pictures(colour, alpha, None if depth is None else depth.astype(np.float64), normals),
         np.iinfo(kind).max if path.suffix == ".png" else None,
@@ -171,7 +171,7 @@ def rendered(path: Path, source: SourceDataset, background: Floats) -> Render:
 
 def drawn(
     splat: Gaussians, name: str, source: SourceDataset, view: View, background: Floats
-) -> Render:
+) -> ShownRender:
     """Return what a Gaussian splat shows in a view, over a background (3,) in sRGB, 0 to 1.
 
     Its depth is infinite where the view's is: Gaussians of a sky are somewhere.
@@ -184,7 +184,7 @@ def drawn(
     if source.has_depth and kind:
         drawn_depth = converted(picture.distance, source.lens.pixel_rays(), "distance", kind)
         depth = np.where(np.isposinf(source.depth(view, kind)), np.inf, drawn_depth)
-    return Render(f"{name}: {view.name}", Pictures(colour, None, depth, None), 255)
+    return ShownRender(f"{name}: {view.name}", Pictures(colour, None, depth, None), 255)
 
 
 def _rounded(source: SourceDataset, view: View, largest: int) -> tuple[Floats, Floats | None]:

@@ -164,7 +164,7 @@ class PlainLens:
             self.end = end = rim(curve, end)
             curves[self.kind] = lambda r: inverse(curve, end, 0, r), curve
             if name in BENT:
-                self.bend = Bend(end, *BENT[name](camera[name], curve))
+                self.bend = PlainBend(end, *BENT[name](camera[name], curve))
         elif self.kind == "LENS_POLYNOMIAL":
             k = np.array([camera[f"fisheye_polynomial_k{i}"] for i in range(5)])
             sign = -np.sign(k[1:][k[1:] != 0][0])
@@ -214,7 +214,7 @@ class PlainLens:
         return self.center + np.stack([u, -v], axis=-1) / self.unit
 
 
-class Bend:
+class PlainBend:
     """What moves the points of a lens that is not radial. A point is a number: up + i right.
 
     It depends on the place in a plane. ``plane`` is a place's radius t at an angle, and ``radius``

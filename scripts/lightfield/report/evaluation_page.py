@@ -18,7 +18,7 @@ from lightfield.formats import gaussians
 from lightfield.formats.lightfield import View
 from lightfield.imaging import images
 from lightfield.measurement import evaluation
-from lightfield.measurement.evaluation import Render
+from lightfield.measurement.evaluation import ShownRender
 from lightfield.measurement.picture_difference import flip_map
 from lightfield.report import page
 from lightfield.stages.measurement import Evaluate, EvaluationSettings
@@ -120,7 +120,7 @@ def write(
 
 def _reader(
     renders: Path, source: SourceDataset, tests: Sequence[View], background: Floats
-) -> Callable[[View], Render]:
+) -> Callable[[View], ShownRender]:
     """Return the function that returns a view's render. All renders must be there."""
     if renders.suffix == ".ply":
         splat = gaussians.read(renders)
@@ -131,7 +131,7 @@ def _reader(
 
 def _compare(
     view: View,
-    render: Render,
+    render: ShownRender,
     source: SourceDataset,
     mask: Path | None,
     background: Floats,

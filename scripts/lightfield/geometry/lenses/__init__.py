@@ -10,7 +10,7 @@ from typing_extensions import TypeAliasType
 
 from lightfield.core.errors import UserError
 from lightfield.geometry.lenses.base import LENSES, MOST_PIXELS, Array, Lens, LensSettings, pair
-from lightfield.geometry.lenses.calibration_settings import CalibrationSettings, of_file
+from lightfield.geometry.lenses.calibration_settings import LensFileSettings, of_file
 from lightfield.geometry.lenses.rectilinear import FileSettings
 from lightfield.settings.base import OTHER_NAMES, checked
 
@@ -41,7 +41,7 @@ OTHER_NAMES.update(
 _MODELS: tuple[type[BaseModel], ...] = (
     *(lens.Settings for lens in LENSES.values() if lens.Settings),
     FileSettings,
-    CalibrationSettings,
+    LensFileSettings,
 )
 if TYPE_CHECKING:
     CameraSettings = LensSettings

@@ -12,7 +12,7 @@ from lightfield.geometry.lenses.calibrations import Model, read
 from lightfield.settings.base import Settings, as_list, pattern, problems
 
 
-class CalibrationSettings(Settings):
+class LensFileSettings(Settings):
     """A lens in the file of a calibration tool.
 
     The file's numbers take the place of these keys before anything else reads the camera. So a
@@ -73,4 +73,4 @@ class CalibrationSettings(Settings):
 
 def of_file(settings: Any) -> Any:
     """Return a camera's settings, in which a calibration file's lens replaces the file."""
-    return settings.of_file() if isinstance(settings, CalibrationSettings) else settings
+    return settings.of_file() if isinstance(settings, LensFileSettings) else settings

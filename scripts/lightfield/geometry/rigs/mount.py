@@ -39,7 +39,7 @@ class Mounting(Settings):
         return np.asarray(np.round(matrix, 15) + 0.0)
 
 
-class HeadCamera(Mounting):
+class HeadCameraSettings(Mounting):
     """One of the cameras of a head."""
 
     camera: CameraSettings = Field(description="Lens and image of the camera.")

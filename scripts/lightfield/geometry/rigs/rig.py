@@ -19,7 +19,7 @@ from lightfield.core.names import Part
 from lightfield.geometry.frames import ONE_PLACE
 from lightfield.geometry.lenses import CameraSettings, build_settings
 from lightfield.geometry.lenses.cube_map import CUBE_FACE_ANGLES
-from lightfield.geometry.rigs.mount import HeadCamera, Mount
+from lightfield.geometry.rigs.mount import HeadCameraSettings, Mount
 from lightfield.geometry.rigs.split_setting import Chosen, Split, part_of
 from lightfield.geometry.rotations import (
     Floats,
@@ -207,7 +207,7 @@ class Rig(Settings):
     camera: CameraSettings = Field(  # type: ignore[assignment]
         None, description="Lens and image of each camera. Required without head."
     )
-    head: dict[Name, HeadCamera] | None = Field(
+    head: dict[Name, HeadCameraSettings] | None = Field(
         None,
         min_length=1,
         description="In place of camera: cameras with fixed poses on one body, which the rig "
