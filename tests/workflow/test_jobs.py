@@ -43,6 +43,7 @@ scene:
   blend: scene.blend
   url: https://example.org/scene.blend
   sha256: "{0:064}"
+  targets: {{board: {{type: chessboard, squares: [4, 3], square: 0.04}}}}
 render: {{target_error: 0.1}}
 report: {{panorama: false}}
 rigs:
