@@ -587,6 +587,7 @@ REFUSED = [
             ("ncore", "points", 0),
             ("lichtfeld", "format", "jpg"),
             ("lichtfeld", "normals", 1),
+            ("coco", "segmentation", 1),
         )
     ),
     *(("flow", value) for value in (True, {"pairs": "all"}, {}, [])),

@@ -489,3 +489,31 @@ def boxed(tmp_path_factory):
 
 def test_boxes_are_those_of_the_passes(boxed):
     assert problems(boxed, "views", "coco") == []
+
+
+def test_segmentations_are_those_of_the_passes(boxed, tmp_path):
+    folder = shutil.copytree(boxed, tmp_path / "dataset")
+    write_export(folder, "views", "coco", {"segmentation": True})
+    assert problems(folder, "views", "coco") == []
+    path = folder / "exports/coco/instances.json"
+    content = read_json(path)
+    wall, ball = (annotation["segmentation"] for annotation in content["annotations"][:2])
+    # As pycocotools 2.0.11 encodes the masks of the first view.
+    assert ball == {"size": [48, 64], "counts": "Z]1:V10000000V[1"}
+    assert wall == {"size": [48, 64], "counts": "0Z]1:lcN0000000V[1"}
+    ball["counts"] = wall["counts"]
+    write_json(path, content)
+    (problem,) = problems(folder, "views", "coco")
+    assert "annotations: 2: is not the object's" in problem
+
+
+def test_segmentation_changes_no_other_byte_of_a_list_of_boxes(boxed, tmp_path):
+    folder = shutil.copytree(boxed, tmp_path / "dataset")
+    write_export(folder, "views", "coco", {"segmentation": True})
+    content = read_json(folder / "exports/coco/instances.json")
+    for annotation in content["annotations"]:
+        del annotation["segmentation"]
+    write_json(folder / "exports/coco/instances.json", content)
+    plain = (boxed / "exports/coco/instances.json").read_bytes()
+    assert (folder / "exports/coco/instances.json").read_bytes() == plain
+    assert "segmentation" not in read_json(boxed / "exports/coco/export.json")["options"]

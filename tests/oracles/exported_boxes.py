@@ -1,4 +1,4 @@
-"""Checks that COCO's boxes are those of the objects and instances that the passes show."""
+"""Checks that COCO's boxes and segmentations are as the passes show the objects and instances."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ def faults(exported: Exported, dataset: Path, image_set: ImageSet) -> Iterator[s
             continue  # The check of the passes reports it.
         wrong = [box for box in boxes.boxes if not _is_right(box, objects, instances)]
         for box in wrong:
-            yield f"{boxes.place}: annotations: {box.number}: is not the box of its object"
+            yield f"{boxes.place}: annotations: {box.number}: is not the object's"
         shown = np.stack([objects[objects > 0], instances[objects > 0]], axis=-1)
         different = {(box.category, box.instance) for box in boxes.boxes}
         missing = {tuple(pair) for pair in np.unique(shown, axis=0).tolist()} - different
@@ -64,4 +64,5 @@ def _is_right(box: Box, objects: Numbers, instances: Numbers) -> bool:
         return False
     across, down = (np.flatnonzero(is_shown.any(axis=axis)) for axis in (0, 1))
     expected: list[Any] = [across[0], down[0], np.ptp(across) + 1, np.ptp(down) + 1]
-    return list(box.sides) == expected and box.area == is_shown.sum()
+    is_box = list(box.sides) == expected and box.area == is_shown.sum()
+    return bool(is_box and (box.mask is None or np.array_equal(box.mask, is_shown)))

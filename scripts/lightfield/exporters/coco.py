@@ -1,17 +1,21 @@
-"""Writes the boxes of objects in each view as COCO's list of instances.
+"""Writes the boxes of objects in each view as COCO's list of instances, and their segmentations.
 
 ``instances.json`` has an image for each view, and a category for each object of the scene. Each
 object or instance that a view shows has an annotation. A box encloses exactly the pixels that show
-the object in the passes ``object`` and ``instance``. Hidden parts of the object do not count.
-Source: "Data format" of the COCO dataset.
+the object in the passes ``object`` and ``instance``. Hidden parts of the object do not count. On
+request, a segmentation has these pixels as the compressed text that pycocotools decodes. Sources:
+"Data format" of the COCO dataset, and pycocotools' maskApi.c and coco.py.
 """
 
 from collections.abc import Iterator
+from itertools import pairwise
+from operator import not_
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
@@ -22,15 +26,23 @@ from lightfield.formats.lightfield import View
 from lightfield.formats.passes import NAMES
 
 Numbers = NDArray[np.uint32]
+Integers = NDArray[np.int64]
 
 
 class Coco(Export):
-    """COCO's list of the objects in each view, with their boxes."""
+    """COCO's list of the objects in each view, with their boxes and segmentations."""
 
     name = "coco"
     summary = "Boxes of the objects in each view, for object detectors."
     rank = 11
     loader = "from pycocotools.coco import COCO\nboxes = COCO('{}/instances.json')"
+
+    # Settings and export.json have it only if it is used, so that earlier exports keep their bytes.
+    segmentation: bool = Field(
+        False,
+        exclude_if=not_,
+        description="Also write which pixels show each object, as RLE that pycocotools decodes.",
+    )
 
     @property
     def needed_passes(self) -> tuple[str, ...]:
@@ -61,17 +73,13 @@ class Coco(Export):
             )
             objects = _pixels(source, view, "object")
             instances = _pixels(source, view, kind)
-            for shown, category, box, area in _boxes(objects, instances):
+            for annotation in _annotations(objects, instances, self.segmentation):
                 annotations.append(
                     {
                         "id": len(annotations) + 1,
                         "image_id": number,
-                        "category_id": category,
-                        "bbox": box,
-                        "area": area,
-                        "iscrowd": 0,
-                        "instance": shown,
-                        "name": names.get(shown, ""),
+                        **annotation,
+                        "name": names.get(annotation["instance"], ""),
                     }
                 )
             progress.done()
@@ -98,23 +106,82 @@ def _pixels(source: SourceDataset, view: View, kind: str) -> Numbers:
     return source.view(view).read(kind)
 
 
-def _boxes(objects: Numbers, instances: Numbers) -> Iterator[tuple[int, int, list[int], int]]:
-    """Yield each instance, its object, its box in pixels, and the number of its pixels.
+def _annotations(
+    objects: Numbers, instances: Numbers, with_segmentation: bool
+) -> list[dict[str, Any]]:
+    """Return the annotations of a view, from its numbers of objects and instances.
 
-    A box is the left column, the upper row, the width and the height. Two objects may share an
-    instance's number: then each has a box of its own.
+    Two objects may share an instance's number: then each has an annotation.
     """
     shown = objects > 0
-    rows, columns = np.nonzero(shown)
     pairs = np.stack([objects[shown], instances[shown]], axis=-1)
-    different, index, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-    index = index.ravel()
-    low = np.full((len(different), 2), np.iinfo(np.int64).max)
-    high = np.full((len(different), 2), -1)
+    different, index = np.unique(pairs, axis=0, return_inverse=True)
+    labels = np.full(objects.shape, -1)
+    labels[shown] = index.ravel()
+    areas = np.bincount(labels[shown], minlength=len(different))
+    annotations: list[dict[str, Any]] = [
+        {"category_id": category, "bbox": box, "area": area, "iscrowd": 0, "instance": instance}
+        for (category, instance), box, area in zip(
+            different.tolist(),
+            _boxes(labels, len(different)).tolist(),
+            areas.tolist(),
+            strict=True,
+        )
+    ]
+    if with_segmentation:
+        for annotation, lengths in zip(annotations, _runs(labels, len(different)), strict=True):
+            annotation["segmentation"] = {"size": list(labels.shape), "counts": _text(lengths)}
+    return annotations
+
+
+def _boxes(labels: Integers, count: int) -> Integers:
+    """Return the boxes (count, 4) of the pixels of each label: left, top, width and height.
+
+    ``labels`` (height, width) are from 0 to ``count``, and -1 for none.
+    """
+    rows, columns = np.nonzero(labels >= 0)
+    index = labels[rows, columns]
     places = np.stack([columns, rows], axis=-1)
+    low = np.full((count, 2), np.iinfo(np.int64).max)
+    high = np.full((count, 2), -1)
     np.minimum.at(low, index, places)
     np.maximum.at(high, index, places)
-    for (category, number), least, most, area in zip(different, low, high, counts, strict=True):
-        width, height = most - least + 1
-        box = [int(least[0]), int(least[1]), int(width), int(height)]
-        yield int(number), int(category), box, int(area)
+    return np.hstack([low, high - low + 1])
+
+
+def _runs(labels: Integers, count: int) -> Iterator[Integers]:
+    """Yield the lengths of runs of pixels, in turn without and with each label.
+
+    The runs go down each column (``labels`` are as for `_boxes`). The first may be empty.
+    """
+    pixels = labels.ravel(order="F")
+    starts = np.flatnonzero(np.diff(pixels, prepend=-2))
+    ends = np.append(starts[1:], pixels.size)
+    order = np.argsort(pixels[starts], kind="stable")
+    first = np.searchsorted(pixels[starts], np.arange(count + 1), sorter=order)
+    for begin, end in pairwise(first):
+        runs = order[begin:end]
+        edges = np.column_stack([starts[runs], ends[runs]]).ravel()
+        lengths = np.diff(edges, prepend=0, append=pixels.size)
+        yield lengths if lengths[-1] else lengths[:-1]
+
+
+def _text(lengths: Integers) -> str:
+    """Return lengths of runs as pycocotools' text, of the differences to the last but one.
+
+    A character has five bits of a number, lowest first. Its bit 32 says that another one follows.
+    """
+    values = lengths.tolist()
+    # The first three are whole.
+    differences = values[:3] + [
+        here - before for before, here in zip(values[1:], values[3:], strict=False)
+    ]
+    return "".join(_characters(difference) for difference in differences)
+
+
+def _characters(number: int) -> str:
+    bits, number = number & 31, number >> 5
+    # The highest bit of the last character is the sign.
+    if number == (-1 if bits & 16 else 0):
+        return chr(48 + bits)
+    return chr(48 + 32 + bits) + _characters(number)

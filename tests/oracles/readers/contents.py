@@ -129,7 +129,8 @@ class Cloud:
 class Box:
     """What an annotation says: its ``number``, left, top, width and height, and area in pixels.
 
-    ``category`` is the number of an object, and ``instance`` that of its instance.
+    ``category`` is the number of an object, and ``instance`` that of its instance. ``mask``
+    (height, width) says which pixels its segmentation has. None without a segmentation.
     """
 
     number: int
@@ -137,6 +138,7 @@ class Box:
     area: float
     category: int
     instance: int
+    mask: NDArray[np.bool_] | None
 
 
 @dataclass(frozen=True)
