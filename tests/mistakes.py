@@ -575,6 +575,10 @@ REFUSED = [
             ("colmap", "rigs", ["LFCuboid"]),
             ("nerfstudio", "exposure", 101),
             ("nerfstudio", "reinhard", 0),
+            ("nerfstudio", "normals", 1),
+            ("nerfstudio", "objects", []),
+            ("nerfstudio", "objects", "Ball"),
+            ("coco", "segmentation", 1),
             ("instant_ngp", "scale", 0),
             ("instant_ngp", "scale", float("inf")),
             ("instant_ngp", "aabb_scale", 3),
@@ -587,7 +591,6 @@ REFUSED = [
             ("ncore", "points", 0),
             ("lichtfeld", "format", "jpg"),
             ("lichtfeld", "normals", 1),
-            ("coco", "segmentation", 1),
         )
     ),
     *(("flow", value) for value in (True, {"pairs": "all"}, {}, [])),

@@ -6,6 +6,7 @@ import json
 import math
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -909,11 +910,8 @@ def lichtfeld_scale(reach, place):
     return (-b + math.sqrt(b * b - a * c)) / a
 
 
-def test_lichtfeld_has_normals_in_the_axes_of_its_cameras(tmp_path):
-    dataset = tmp_path / "dataset"
-    write_views(dataset, LENSES["fisheye"], RIG | {"rotation": [10, 20, 30]})
-    with pytest.raises(UserError, match=r"normal/view_0000f.exr: is missing; normals need passes"):
-        exported(dataset, "lichtfeld", "views", tmp_path, normals=True)
+def write_normals(dataset):
+    """Write the pass normal of views that see the sphere from within. Return them by view."""
     lightfield = LightField.read(dataset / "lightfield.json")
     rays = lightfield.lens.pixel_rays()
     true_normals = {}
@@ -926,6 +924,16 @@ def test_lichtfeld_has_normals_in_the_axes_of_its_cameras(tmp_path):
         path.parent.mkdir(exist_ok=True)
         images.write_exr(path, dict(zip("RGB", planes, strict=True)))
     lightfield.changed(passes=["normal"]).write(lightfield.path)
+    return true_normals
+
+
+def test_lichtfeld_has_normals_in_the_axes_of_its_cameras(tmp_path):
+    dataset = tmp_path / "dataset"
+    write_views(dataset, LENSES["fisheye"], RIG | {"rotation": [10, 20, 30]})
+    with pytest.raises(UserError, match=r"normal/view_0000f.exr: is missing; normals need passes"):
+        exported(dataset, "lichtfeld", "views", tmp_path, normals=True)
+    true_normals = write_normals(dataset)
+    rays = LightField.read(dataset / "lightfield.json").lens.pixel_rays()
     folder = exported(dataset, "lichtfeld", "views", tmp_path, normals=True)
     content = json.loads((folder / "transforms.json").read_text())
     for path, matrix in lichtfeld_cameras(content).items():
@@ -934,6 +942,90 @@ def test_lichtfeld_has_normals_in_the_axes_of_its_cameras(tmp_path):
         world = (colours / 255 * 2 - 1) @ matrix[:3, :3] * [1, -1, -1]
         np.testing.assert_allclose(world, true_normals[path.stem], atol=0.011)
         assert (colours[~np.isfinite(rays[..., 0])] == 128).all()
+
+
+def test_dn_splatter_reads_a_nerfstudio_export_s_normals(tmp_path):
+    """Its parser pairs sorted images with sorted normals. Its dataset turns them to OpenGL's axes.
+
+    Source: normal_nerfstudio.py, and get_normal_image_from_path of dn_dataset.py, whose comments
+    have the two systems the wrong way round. dn_model.py compares with OpenGL's axes.
+    """
+    dataset = tmp_path / "dataset"
+    write_views(dataset, LENSES["perspective"], RIG | {"rotation": [10, 20, 30]})
+    true_normals = write_normals(dataset)
+    folder = exported(dataset, "nerfstudio", "views", tmp_path, points=50, normals=True)
+    frames = json.loads((folder / "transforms.json").read_text())["frames"]
+    frames.sort(key=lambda frame: frame["file_path"])
+    paths = sorted((folder / "normals_from_pretrain").glob("*.png"))
+    assert len(paths) == len(frames) == 12
+    for frame, path in zip(frames, paths, strict=True):
+        channels = images.read_image(path).channels
+        colours = np.stack([channels[name] for name in "RGB"], axis=-1)
+        in_camera = (colours / 255 * 2 - 1) @ np.diag([1, -1, -1])
+        assert (in_camera[..., 2] > 0).all()  # Towards the camera, which looks along −z.
+        world = in_camera @ np.array(frame["transform_matrix"])[:3, :3].T
+        np.testing.assert_allclose(world, true_normals[path.stem], atol=0.011)
+
+
+@pytest.mark.parametrize("source", ["fisheye", "panorama", "OPENCV"])
+def test_normals_of_lenses_that_dn_splatter_takes_for_pinholes_are_refused(
+    dataset, tmp_path, source
+):
+    with pytest.raises(UserError, match="has normals for dn-splatter, which takes it for a pinh"):
+        exported(dataset, "nerfstudio", source, tmp_path, normals=True)
+
+
+def test_normals_that_dn_splatter_would_mix_up_are_refused(tmp_path):
+    folders = {name: tmp_path / name / "dataset" for name in ("a9", "a10", "a11")}
+    for folder in folders.values():
+        write_views(folder, LENSES["perspective"], RIG)
+        write_normals(folder)
+    settings = EXPORTERS["nerfstudio"](sources=["views"], normals=True, points=50)
+    source = SourceDataset(folders.pop("a11"), "", ".exr", folders)
+    with pytest.raises(UserError, match="frames: have names with numbers of different lengths"):
+        exports.run(source, settings, tmp_path / "export")
+    assert not (tmp_path / "export").exists()
+    exports.run(replace(source, beside={"a10": folders["a10"]}), settings, tmp_path / "export")
+    assert len(list((tmp_path / "export/normals_from_pretrain").iterdir())) == 24
+
+
+def write_objects(dataset):
+    """Write a pass of objects: a ball and a cup before a wall. Return their numbers (h, w)."""
+    lightfield = LightField.read(dataset / "lightfield.json")
+    numbers = np.ones((lightfield.lens.height, lightfield.lens.width), np.uint32)
+    numbers[10:30, 12:24], numbers[5:8, 40:50], numbers[:4] = 2, 3, 0
+    for view in lightfield.views:
+        images.write_exr(dataset / "object" / f"{view.name}.exr", {"Y": numbers})
+    (dataset / "object/names.json").write_text('{"Wall": 1, "Ball": 2, "Cup.001": 3, "Sun": 4}')
+    lightfield.changed(passes=["object"]).write(lightfield.path)
+    return numbers
+
+
+def test_nerfstudio_masks_all_but_the_chosen_objects(tmp_path):
+    dataset = tmp_path / "dataset"
+    write_views(dataset, VIEWS, RIG)
+    numbers = write_objects(dataset)
+    options = {"points": 50, "objects": ["Cup.001", "Wall"]}
+    folder = exported(dataset, "nerfstudio", "views", tmp_path, **options)
+    is_seen = np.isfinite(LightField.read(dataset / "lightfield.json").lens.pixel_rays()[..., 0])
+    frames = json.loads((folder / "transforms.json").read_text())["frames"]
+    for frame in frames:
+        mask = images.read_image(folder / frame["mask_path"]).channels["Y"]
+        expected = is_seen & ((numbers == 1) | (numbers == 3))
+        np.testing.assert_array_equal(mask, np.where(expected, 255, 0))
+
+
+def test_objects_that_no_view_shows_are_refused(tmp_path):
+    dataset = tmp_path / "dataset"
+    write_views(dataset, VIEWS, RIG)
+    write_objects(dataset)
+    for objects, problem in (
+        (["Wall", "Bal"], r"lightfield.json: its pass object has no 'Bal'.*did you mean Ball\?"),
+        (["Sun"], "lightfield.json: no view shows any of exports.nerfstudio.objects: Sun"),
+    ):
+        with pytest.raises(UserError, match=problem):
+            exported(dataset, "nerfstudio", "views", tmp_path, objects=objects)
+        assert not (tmp_path / "nerfstudio/views").exists()
 
 
 def test_equal_ncore_sequences_have_equal_bytes(dataset, tmp_path):
@@ -1272,6 +1364,8 @@ def test_a_failed_export_leaves_nothing(dataset, tmp_path):
             "holds no depth; give reprojections.again format: exr",
         ),
         ("lichtfeld", "again", VIEWS, {"normals": True}, "lacks the pass normal; add it to"),
+        ("nerfstudio", "again", VIEWS, {"normals": True}, "lacks the pass normal; add it to"),
+        ("nerfstudio", "again", VIEWS, {"objects": ["a"]}, "lacks the pass object; add it to"),
         ("wai", "views", VIEWS, {}, "is not perspective, but MapAnything takes only such views"),
         ("wai", "again", VIEWS, {}, "holds no depth; give reprojections.again format: exr"),
         ("poses_csv", "elsewhere", VIEWS, {}, "is 'elsewhere'; must be of views, again"),

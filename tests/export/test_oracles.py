@@ -517,3 +517,13 @@ def test_segmentation_changes_no_other_byte_of_a_list_of_boxes(boxed, tmp_path):
     plain = (boxed / "exports/coco/instances.json").read_bytes()
     assert (folder / "exports/coco/instances.json").read_bytes() == plain
     assert "segmentation" not in read_json(boxed / "exports/coco/export.json")["options"]
+
+
+def test_masks_of_chosen_objects_are_those_of_the_pass(boxed, tmp_path):
+    folder = shutil.copytree(boxed, tmp_path / "dataset")
+    write_export(folder, "views", "nerfstudio", {"points": 60, "objects": ["Ball"]})
+    assert picture_problems(folder, "views", "nerfstudio") == []
+    path = folder / "exports/nerfstudio/masks/view_0001f.png"
+    images.write_png(path, images.read_image(path).channels["Y"] ^ 255)
+    (problem,) = picture_problems(folder, "views", "nerfstudio")
+    assert "view_0001f.png: has another mask than its view in 3072 of 3072 pixels" in problem

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
+from lightfield.core.files import read_json
 from lightfield.formats.layout import ImageSet
+from lightfield.formats.passes import NAMES, PASSES
 from lightfield.imaging import images
 from lightfield.imaging.tonemap import encode_srgb
 from lightfield.validation.cameras import camera_of
@@ -64,7 +66,7 @@ def _faults_of_view(
     for suffix in (".exr", ".png"):
         path = dataset / image_set.folder / f"{image_set.views[view]}{suffix}"
         if path.is_file():
-            shown_views.append(_ShownView(image_set, view, images.read_image(path)))
+            shown_views.append(_ShownView(dataset, image_set, view, images.read_image(path)))
     for picture in pictures:
         faults = [shown.fault(picture) for shown in shown_views if shown.can_be_shown(picture)]
         if faults and all(faults):
@@ -79,7 +81,8 @@ def _has_size(pixels: NDArray[Any], image_set: ImageSet) -> bool:
 class _ShownView:
     """What the pictures of a view must show, by one file of the view."""
 
-    def __init__(self, image_set: ImageSet, view: int, image: images.Image) -> None:
+    def __init__(self, dataset: Path, image_set: ImageSet, view: int, image: images.Image) -> None:
+        self.dataset = dataset
         self.image_set = image_set
         self.lightfield = image_set.lightfield
         self.view = view
@@ -97,9 +100,8 @@ class _ShownView:
     def fault(self, picture: Picture) -> str | None:
         """Return how a picture differs from the view. None if it does not."""
         if picture.path is None:
-            if self.valid.all():
-                return None
-            return f"has no mask, but {self._count(~self.valid)} of the view show nothing"
+            kept = self.valid & self._chosen(picture.objects)
+            return None if kept.all() else f"has no mask, but {self._count(~kept)} do not count"
         comparisons: dict[str, tuple[str, Callable[[Picture], Bools]]] = {
             "colour": ("colour", self._wrong_colours),
             "opaque": ("colour", self._wrong_colours),
@@ -178,7 +180,18 @@ class _ShownView:
 
     def _wrong_mask(self, picture: Picture) -> Bools:
         shown = self._channel(picture, "Y")
-        return np.asarray((shown > 0) != self.valid)
+        return np.asarray((shown > 0) != (self.valid & self._chosen(picture.objects)))
+
+    def _chosen(self, names: Sequence[str]) -> Bools:
+        """Where (height, width) the pass of objects has one of the names. All without names."""
+        if not names:
+            return np.ones_like(self.valid)
+        listed = read_json(self.dataset / "object" / NAMES)
+        path = PASSES["object"].path(
+            self.dataset / self.image_set.name, self.image_set.views[self.view]
+        )
+        numbers = images.read_image(path, ["Y"]).channels["Y"]
+        return np.logical_or.reduce([numbers == listed[name] for name in names])
 
     def _wrong_hidden(self, picture: Picture) -> Bools:
         """Compare instant-ngp's mask, which is above 0 where pixels are ignored.

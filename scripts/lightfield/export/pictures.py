@@ -1,14 +1,20 @@
-"""Writes the pictures of a source's views, and masks of the pixels that show nothing."""
+"""Writes a source's views as pictures, their masks of pixels to ignore, and normals as colours."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
-from lightfield.export.source import SourceDataset
+from lightfield.export.source import Bools, Floats, SourceDataset
 from lightfield.formats.lightfield import View
 from lightfield.imaging import images
+
+# From the axes of Blender's camera (y up, looks along −z) to the axes of normals (y down, looks
+# along z).
+_FLIP = np.array([1.0, -1.0, -1.0])
 
 
 def write_pictures(
@@ -21,22 +27,41 @@ def write_pictures(
     views: Sequence[View] | None = None,
     mask_all: bool = False,
     write: Callable[[View, Path], None] | None = None,
+    counts: Callable[[View], Bools] | None = None,
 ) -> Iterator[tuple[View, bool]]:
     """Write each view's picture and mask into ``folder``. Yield the view, and if it has a mask.
 
-    Only views with pixels that show nothing get a mask, unless ``mask_all``. It is 0 in these
-    pixels, which consumers ignore, and 255 elsewhere. ``picture`` and ``mask`` are paths, such as
-    "images/{}.png" for a view's name. ``views`` are the source's by default. ``write`` writes a
-    picture, by default as an 8-bit PNG. Shows the progress under a ``title``.
+    Only views with pixels that do not count get a mask, unless ``mask_all``. It is 0 in these
+    pixels, which consumers ignore, and 255 elsewhere. ``counts`` returns which pixels (height,
+    width) of a view count, by default all that show something. ``picture`` and ``mask`` are paths,
+    such as "images/{}.png" for a view's name. ``views`` are the source's by default. ``write``
+    writes a picture, by default as an 8-bit PNG. Shows the progress under a ``title``.
     """
     views = source.lightfield.views if views is None else views
     write = write or source.write_image
+    counts = counts or source.valid
     progress = Progress(len(views), title, "views")
     for view in views:
         write(view, folder / picture.format(view.name))
-        valid = source.valid(view)
-        has_mask = mask_all or not valid.all()
+        counting = counts(view)
+        has_mask = mask_all or not counting.all()
         if has_mask:
-            images.write_png(folder / mask.format(view.name), valid.astype(np.uint8) * 255)
+            images.write_png(folder / mask.format(view.name), counting.astype(np.uint8) * 255)
         yield view, has_mask
         progress.done()
+
+
+def normal_colours(source: SourceDataset, view: View) -> NDArray[np.uint8]:
+    """Return a view's normals (height, width, 3) as colours, (n + 1) / 2 of 255.
+
+    They have the camera's axes: x right, y down and z forward. Grey for none. Raises `UserError` if
+    the view has no normals.
+    """
+    path = source.view(view).pass_path("normal")
+    if not path.is_file():
+        raise UserError(
+            f"{path}: is missing; normals need passes: [normal] in render and in the reprojection"
+        )
+    world: Floats = source.view(view).normal.astype(np.float64)
+    local = world @ view.world_from_camera[:3, :3] * _FLIP
+    return np.asarray(np.round((local + 1) / 2 * 255), np.uint8)

@@ -21,12 +21,11 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from lightfield.core.errors import UserError
 from lightfield.core.files import link_or_copy, write_json, write_text
 from lightfield.export import cameras
-from lightfield.export.pictures import write_pictures
+from lightfield.export.pictures import normal_colours, write_pictures
 from lightfield.export.points import lift, write_ply
-from lightfield.export.source import Floats, SourceDataset
+from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.exporters.base import (
     NO_DEPTH,
@@ -46,10 +45,6 @@ from lightfield.imaging import images
 
 POINT_CLOUD = "points.ply"
 MOST = np.iinfo(np.uint16).max
-
-# From the axes of Blender's camera (y up, looks along −z) to the axes of normals (y down, looks
-# along z).
-_FLIP = np.array([1.0, -1.0, -1.0])
 
 
 class LichtFeld(ForTraining):
@@ -116,7 +111,9 @@ class LichtFeld(ForTraining):
             if self.depth:
                 images.write_png(folder / "depth" / f"{view.name}.png", _depth(source, view))
             if self.normals:
-                images.write_png(folder / "normals" / f"{view.name}.png", _normals(source, view))
+                images.write_png(
+                    folder / "normals" / f"{view.name}.png", normal_colours(source, view)
+                )
             path = picture.format(view.name)
             frames.append({"file_path": path, "transform_matrix": view.world_from_camera.tolist()})
         write_ply(folder / POINT_CLOUD, lift(source, count=self.points))
@@ -164,15 +161,3 @@ def _depth(source: SourceDataset, view: View) -> np.ndarray[Any, np.dtype[np.uin
     # A surface that rounds to 0 would have none.
     steps = np.maximum(np.round(depth / farthest * MOST), 1)
     return np.where(has_depth, steps, 0).astype(np.uint16)
-
-
-def _normals(source: SourceDataset, view: View) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """Return a view's normals (h, w, 3) as colours. Raises `UserError` if it has none."""
-    path = source.view(view).pass_path("normal")
-    if not path.is_file():
-        raise UserError(
-            f"{path}: is missing; normals need passes: [normal] in render and in the reprojection"
-        )
-    world: Floats = source.view(view).normal.astype(np.float64)
-    local = world @ view.world_from_camera[:3, :3] * _FLIP
-    return np.asarray(np.round((local + 1) / 2 * 255), np.uint8)

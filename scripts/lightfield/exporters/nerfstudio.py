@@ -3,29 +3,39 @@
 - ``transforms.json``: camera-to-world matrices as in lightfield.json (OpenGL axes, Z up), and a
   list of files for each part. Each frame has its own intrinsics if there are several lenses.
 - ``images/``: the views.
-- ``masks/``: 0 means ignored. Either all frames have a mask, or none.
+- ``masks/``: 0 means ignored. Either all frames have a mask, or none. With the key objects, all
+  pixels are ignored that show none of these objects.
 - ``depths/``: 16-bit millimetres, if the settings ask for them. Z for perspective views. Distance
   for all others, whose rays have unit length in nerfstudio. 0 for none, and beyond 65.535 m. The
   unit is an option of nerfstudio's parser, which no file can set.
+- ``normals_from_pretrain/``: 8-bit (n + 1) / 2 in the camera's axes, x right, y down and z forward,
+  if the settings ask for it. Grey for none. nerfstudio reads no normals. dn-splatter's parser
+  normal-nerfstudio finds them here, in the natural order of their names. Its format omnidata, the
+  default, has these axes: it turns them to nerfstudio's before it compares.
 - ``points.ply``: a point cloud.
 
 Splatfacto treats every camera as a pinhole: give it perspective views. Brush reads the same files,
-and refuses panoramas. Sources: nerfstudio's nerfstudio_dataparser.py and cameras.py,
-and formats/nerfstudio.rs of Brush 1.0.
+and refuses panoramas. Sources: nerfstudio's nerfstudio_dataparser.py, pixel_samplers.py and
+cameras.py; dn-splatter's normal_nerfstudio.py, dn_dataset.py and dn_model.py; and
+formats/nerfstudio.rs of Brush 1.0.
 """
 
+import re
 import sys
+from collections.abc import Callable
+from operator import not_
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import Field
 
+from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
 from lightfield.export import cameras, heads
-from lightfield.export.pictures import write_pictures
+from lightfield.export.pictures import normal_colours, write_pictures
 from lightfield.export.points import lift, write_ply
-from lightfield.export.source import DepthMaps, SourceDataset
+from lightfield.export.source import Bools, DepthMaps, SourceDataset
 from lightfield.export.trainer_splits import splits
 from lightfield.exporters.base import (
     NO_DEPTH,
@@ -34,6 +44,7 @@ from lightfield.exporters.base import (
     PointCount,
     sideways_refusal,
 )
+from lightfield.formats.lightfield import View
 from lightfield.geometry.depth import conventional_depth
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.brown_conrady import BrownConrady
@@ -43,6 +54,8 @@ from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.fisheye624 import Fisheye624
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.imaging import images
+from lightfield.settings.base import suggestion
 
 POINT_CLOUD = "points.ply"
 _MODELS: dict[type[Lens], str] = {
@@ -73,12 +86,33 @@ class Nerfstudio(ForTraining):
 
     points: PointCount = Field(50000, description="Largest number of points in the point cloud.")
     depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
+    # Settings and export.json have these two only if they are used, so that earlier exports keep
+    # their bytes.
+    normals: bool = Field(
+        False,
+        exclude_if=not_,
+        description="Also write normals for dn-splatter. The source must have the pass normal.",
+    )
+    objects: list[str] | None = Field(
+        None,
+        min_length=1,
+        exclude_if=not_,
+        description="Names of the objects to train on. Masks exclude all other pixels. The source "
+        "must have the pass object.",
+    )
     # This changes no file.
     splatfacto: bool = Field(
         False, exclude=True, description="Whether to refuse lenses that splatfacto cannot train on."
     )
 
+    @property
+    def needed_passes(self) -> tuple[str, ...]:
+        needed = {"normal": self.normals, "object": bool(self.objects)}
+        return tuple(name for name, is_needed in needed.items() if is_needed)
+
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        if self.normals and not isinstance(lens, Rectilinear):
+            return f"has normals for dn-splatter, which takes it for a pinhole; {TO_RECTILINEAR}"
         # splatfacto undistorts OPENCV.
         if self.splatfacto and not isinstance(lens, Rectilinear | BrownConrady):
             return f"would be taken for a pinhole by splatfacto; {TO_RECTILINEAR}"
@@ -122,7 +156,10 @@ class Nerfstudio(ForTraining):
                     file=sys.stderr,
                 )
         has_lenses = len(source.lenses) > 1
-        masked = any(not source.valid(view).all() for view in views)
+        counts = _counting(source, self.objects) if self.objects else source.valid
+        masked = any(not counts(view).all() for view in views)
+        if self.normals:
+            _check_names(source)
         frames = []
         depth_maps = DepthMaps(_DEPTH_UNIT)
         for view, _ in write_pictures(
@@ -132,6 +169,7 @@ class Nerfstudio(ForTraining):
             picture="images/{}.png",
             mask="masks/{}.png",
             mask_all=masked,
+            counts=counts,
         ):
             name = f"{view.name}.png"
             frame: dict[str, Any] = {
@@ -145,6 +183,9 @@ class Nerfstudio(ForTraining):
             if self.depth:
                 frame["depth_file_path"] = f"depths/{name}"
                 depth_maps.write(folder / "depths" / name, source.depth(view, meaning))
+            if self.normals:
+                path = folder / "normals_from_pretrain" / name
+                images.write_png(path, normal_colours(source, view))
             frames.append(frame)
         depth_maps.report(folder)
         parts = splits(source.lightfield)
@@ -163,6 +204,57 @@ class Nerfstudio(ForTraining):
             content[f"{part}_filenames"] = [paths[view.name] for view in part_views]
         content["frames"] = frames
         write_json(folder / "transforms.json", content)
+
+
+def _counting(source: SourceDataset, objects: list[str]) -> Callable[[View], Bools]:
+    """Return a function with the pixels (height, width) of a view that show one of the objects.
+
+    Raises `UserError` if the scene has no object of a name, or if no view shows any.
+    """
+
+    def counts(view: View) -> Bools:
+        shown = source.view(view)
+        numbers = shown.dataset.names("object")
+        for name in objects:
+            if name not in numbers:
+                raise UserError(
+                    f"{shown.dataset.lightfield.path}: its pass object has no {name!r}, which "
+                    f"exports.nerfstudio.objects names{suggestion(name, numbers)}"
+                )
+        chosen = np.isin(shown.read("object"), [numbers[name] for name in objects])
+        return np.asarray(chosen & source.valid(view))
+
+    if not any(counts(view).any() for view in source.lightfield.views):
+        raise UserError(
+            f"{source.lightfield.path}: no view shows any of exports.nerfstudio.objects: "
+            f"{', '.join(objects)}"
+        )
+    return counts
+
+
+def _check_names(source: SourceDataset) -> None:
+    """Check that dn-splatter pairs images, ordered as text, with normals, ordered by numbers.
+
+    Raises `UserError` if it does not.
+    """
+    names = [view.name for view in source.lightfield.views]
+    place = f"{source.lightfield.path}: frames"
+    if any("/" in name for name in names):
+        raise UserError(
+            f"{place}: are of a head, for whose cameras dn-splatter finds no normals; leave out "
+            "normals: true"
+        )
+    if sorted(names, key=_with_numbers) != sorted(names):
+        raise UserError(
+            f"{place}: have names with numbers of different lengths, whose normals dn-splatter "
+            "mixes up; give them zeros in front, as in rig_02"
+        )
+
+
+def _with_numbers(name: str) -> list[str | int]:
+    """Return the texts in a name, and in turn the numbers between them."""
+    parts = re.split(r"(\d+)", name)
+    return [int(part) if index % 2 else part for index, part in enumerate(parts)]
 
 
 def camera(lens: Lens) -> dict[str, Any]:

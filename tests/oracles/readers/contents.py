@@ -96,6 +96,7 @@ class Picture:
     - ``meaning``: which depth, "z" or "distance".
     - ``development``: exposure and white with which light becomes sRGB.
     - ``size``: width and height of a file without a header of its own.
+    - ``objects``: names of the only objects whose pixels a mask keeps. Without any, it keeps all.
     """
 
     place: str
@@ -110,6 +111,7 @@ class Picture:
     development: tuple[float, float] = (0.0, 1.0)
     size: tuple[int, int] = (0, 0)
     position: tuple[float, ...] = ()
+    objects: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -201,10 +203,10 @@ class Exported:
         if path.is_file():
             self.pictures.append(Picture(str(path), path, view, kind, **meaning))
 
-    def add_mask(self, path: Path, view: str) -> None:
+    def add_mask(self, path: Path, view: str, objects: Sequence[str] = ()) -> None:
         """Add the mask of a view. If the file is missing, all pixels of the view count."""
-        exists = path.is_file()
-        self.pictures.append(Picture(str(path), path if exists else None, view, "mask"))
+        there = path if path.is_file() else None
+        self.pictures.append(Picture(str(path), there, view, "mask", objects=tuple(objects)))
 
     def expect(self, place: str, actual: Any, expected: Any) -> None:
         """Note a fault if a number or a text is not the ``expected`` one."""

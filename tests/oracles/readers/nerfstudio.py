@@ -54,6 +54,7 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
         depths = sum("depth_file_path" in frame for frame in frames)
         expected_depths = len(frames) if options["depth"] else 0
         exported.expect(f"{path}: frames with a depth_file_path", depths, expected_depths)
+        _check_normals(folder / "normals_from_pretrain", exported, options)
         for part, name in PARTS.items():
             names = [Path(str(file)).stem for file in content[f"{part}_filenames"]]
             exported.parts.append(Part(f"{path}: {part}_filenames", name, names))
@@ -63,13 +64,21 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
     return exported
 
 
+def _check_normals(folder: Path, exported: Exported, options: dict[str, Any]) -> None:
+    """Check that each view has the normals that dn-splatter finds in their order."""
+    files = sorted(file.stem for file in folder.glob("*.png"))
+    wanted = sorted(view.name for view in exported.views) if options.get("normals") else []
+    exported.expect(f"{folder}: normals of the views", files == wanted, True)
+
+
 def _add_pictures(
     folder: Path, frame: dict[str, Any], view: str, options: dict[str, Any], exported: Exported
 ) -> None:
     """Add the picture of a frame, its mask, and its depth in millimetres."""
     colour = folder / str(frame["file_path"])
     exported.add_picture(colour, view, "colour", development=development(options))
-    exported.add_mask(folder / str(frame.get("mask_path", f"masks/{view}.png")), view)
+    mask = folder / str(frame.get("mask_path", f"masks/{view}.png"))
+    exported.add_mask(mask, view, options.get("objects", ()))
     if "depth_file_path" in frame:
         # Rays of OPENCV and FISHEYE624 have length 1 along the axis. Other rays have length 1.
         is_pinhole = isinstance(exported.cameras[0].camera, Pinhole | OfColmap)
