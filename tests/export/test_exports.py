@@ -989,26 +989,32 @@ def test_normals_that_dn_splatter_would_mix_up_are_refused(tmp_path):
     assert len(list((tmp_path / "export/normals_from_pretrain").iterdir())) == 24
 
 
-def write_objects(dataset):
+def write_objects(dataset, source=""):
     """Write a pass of objects: a ball and a cup before a wall. Return their numbers (h, w)."""
-    lightfield = LightField.read(dataset / "lightfield.json")
+    lightfield = LightField.read(dataset / source / "lightfield.json")
     numbers = np.ones((lightfield.lens.height, lightfield.lens.width), np.uint32)
     numbers[10:30, 12:24], numbers[5:8, 40:50], numbers[:4] = 2, 3, 0
     for view in lightfield.views:
-        images.write_exr(dataset / "object" / f"{view.name}.exr", {"Y": numbers})
-    (dataset / "object/names.json").write_text('{"Wall": 1, "Ball": 2, "Cup.001": 3, "Sun": 4}')
+        images.write_exr(dataset / source / "object" / f"{view.name}.exr", {"Y": numbers})
     lightfield.changed(passes=["object"]).write(lightfield.path)
+    (dataset / "object").mkdir(exist_ok=True)
+    (dataset / "object/names.json").write_text('{"Wall": 1, "Ball": 2, "Cup.001": 3, "Sun": 4}')
     return numbers
 
 
-def test_nerfstudio_masks_all_but_the_chosen_objects(tmp_path):
+@pytest.mark.parametrize("source", ["views", "flat"])
+def test_nerfstudio_masks_all_but_the_chosen_objects(tmp_path, source):
     dataset = tmp_path / "dataset"
     write_views(dataset, VIEWS, RIG)
-    numbers = write_objects(dataset)
+    write_views(dataset / "flat", LENSES["perspective"], RIG)
+    place = "" if source == "views" else source
+    numbers = write_objects(dataset, place)
     options = {"points": 50, "objects": ["Cup.001", "Wall"]}
-    folder = exported(dataset, "nerfstudio", "views", tmp_path, **options)
-    is_seen = np.isfinite(LightField.read(dataset / "lightfield.json").lens.pixel_rays()[..., 0])
+    folder = exported(dataset, "nerfstudio", source, tmp_path, **options)
+    lens = LightField.read(dataset / place / "lightfield.json").lens
+    is_seen = np.isfinite(lens.pixel_rays()[..., 0])
     frames = json.loads((folder / "transforms.json").read_text())["frames"]
+    assert len(frames) == 12
     for frame in frames:
         mask = images.read_image(folder / frame["mask_path"]).channels["Y"]
         expected = is_seen & ((numbers == 1) | (numbers == 3))
