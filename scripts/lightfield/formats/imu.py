@@ -111,7 +111,7 @@ def _write_samples(sensor: Path, truth: Path, rig: rigs.Path, imu: Imu) -> None:
 
 def _nanoseconds(seconds: Floats) -> NDArray[np.int64]:
     """Return times as whole nanoseconds."""
-    return np.rint(seconds * 1e9).astype(np.int64)
+    return np.asarray(np.rint(seconds * 1e9), np.int64)
 
 
 def _write_table(path: Path, header: list[str], times: NDArray[np.int64], *columns: Floats) -> None:

@@ -304,7 +304,7 @@ class AprilGrid(Board):
     def _edges(self, count: int) -> Floats:
         """Return where the sides of tags begin and end (2 count,), from the first tag's begin."""
         begins = np.arange(count) * (1 + self.spacing)
-        return self.tag * np.stack([begins, begins + 1], axis=-1).ravel()
+        return np.asarray(self.tag * np.stack([begins, begins + 1], axis=-1).ravel())
 
 
 AnyBoard = Annotated[Chessboard | Charuco | AprilGrid, Field(discriminator="type")]

@@ -169,4 +169,4 @@ def upright_rates(rotations: Floats, direction: Floats, change: Floats) -> Float
 
 def _dot(first: Floats, second: Floats) -> Floats:
     """Return the scalar products (n, 1) of vectors (n, 3)."""
-    return np.sum(first * second, axis=-1, keepdims=True)
+    return np.asarray(np.sum(first * second, axis=-1, keepdims=True))

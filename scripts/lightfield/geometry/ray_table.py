@@ -164,4 +164,4 @@ def _fitted(offsets: Array, inside: Array) -> Array:
     smooth = sparse.vstack([sparse.kron(third, one), sparse.kron(one, third)])
     solver = splu((rows.T @ rows + smooth.T @ smooth).tocsc())
     planes = [solver.solve(rows.T @ plane[inside]) for plane in offsets]
-    return np.stack(planes, axis=-1).reshape(count, count, 2)
+    return np.asarray(np.stack(planes, axis=-1).reshape(count, count, 2))

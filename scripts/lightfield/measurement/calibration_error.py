@@ -112,7 +112,7 @@ def _best_rotation(true: Lens, calibrated: Lens, rays: Floats) -> Rotation:
     def residuals(vector: Floats) -> Floats:
         turned = fitted_rays @ Rotation.from_rotvec(vector).as_matrix().T
         # A ray at the rim may leave the calibrated lens.
-        return np.nan_to_num(calibrated.pixels(turned) - fitted_pixels).ravel()
+        return np.asarray(np.nan_to_num(calibrated.pixels(turned) - fitted_pixels).ravel())
 
     return Rotation.from_rotvec(least_squares(residuals, np.zeros(3), x_scale=1e-3).x)
 

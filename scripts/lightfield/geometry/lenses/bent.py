@@ -187,7 +187,7 @@ class BentLens(CalibratedLens):
         ratio = _quotient(r, t, 1.0)
         radial = places * ratio
         kept = places * _quotient(inner, t, 1.0)
-        offsets = goals - radial - self._bend.moves(*kept)
+        offsets: Array = goals - radial - self._bend.moves(*kept)
         (uu, uv), (vu, vv) = self._bend.jacobian(*kept)
         across, upwards = places * _quotient(np.ones_like(t), t, 0.0)
         beyond = np.flatnonzero(t > self._largest_t)

@@ -66,13 +66,11 @@ class BrownConrady(BentLens):
         rising = (above + 2 * square * above.deriv()) * below - 2 * square * above * below.deriv()
 
         # A coefficient may be as large as 1e99.
-        quiet = np.errstate(divide="ignore", invalid="ignore", over="ignore")
-
-        @quiet
+        @np.errstate(divide="ignore", invalid="ignore", over="ignore")
         def value(t: Any) -> Any:
             return t * (above(t * t) / below(t * t))
 
-        @quiet
+        @np.errstate(divide="ignore", invalid="ignore", over="ignore")
         def slope(t: Any) -> Any:
             return rising(t * t) / below(t * t) ** 2
 

@@ -205,6 +205,6 @@ def checked_range(name: str, value: float, is_inside: bool, allowed: str) -> Non
 
 def odd_polynomial(terms: Sequence[float]) -> list[float]:
     """Return the coefficients of θ + c1 θ³ + c2 θ⁵ + …, whose even powers have none."""
-    coefficients = np.zeros(2 * len(terms) + 2)
+    coefficients = [0.0] * (2 * len(terms) + 2)
     coefficients[1::2] = (1.0, *terms)
-    return coefficients.tolist()
+    return coefficients
