@@ -143,9 +143,10 @@ def test_every_pixel_of_euroc_is_undistorted_as_by_opencv() -> None:
     x, y = np.meshgrid(np.arange(752.0), np.arange(480.0))
     pixels = np.stack([x, y], axis=-1).reshape(-1, 1, 2)
     stop = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 200, 1e-13)
-    plane = cv2.undistortPoints(
-        pixels, matrix(EUROC, 0), np.array(EUROC.coefficients), criteria=stop
-    )[:, 0]
+    # OpenCV 5 has no name of its own for the iterations.
+    undistort = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)
+    camera = matrix(EUROC, 0), np.array(EUROC.coefficients)
+    plane = undistort(pixels, *camera, R=None, P=None, criteria=stop)[:, 0]
     expected = np.column_stack([plane, np.ones(len(plane))]) * FLIP
     expected /= np.linalg.norm(expected, axis=1, keepdims=True)
     rays = EUROC.pixel_rays().reshape(-1, 3)
