@@ -11,7 +11,7 @@ covariance of the Gaussian is σ² (a_u a_uᵀ + a_v a_vᵀ + t² n nᵀ).
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from lightfield.export.trainer_splits import splits
 from lightfield.formats.gaussians import Gaussians, harmonics_of
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
+from lightfield.geometry.rotations import matrix_to_quaternion
 from lightfield.geometry.visibility import ONE_SURFACE, lies_on
 
 Singles = NDArray[np.float32]
@@ -60,6 +61,7 @@ class _Grid:
 
     lens: Lens
     step: float
+    _rays: dict[tuple[float, float], Floats] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def columns(self) -> NDArray[np.intp]:
@@ -71,9 +73,13 @@ class _Grid:
 
     def rays(self, right: float = 0, below: float = 0) -> Floats:
         """Return the unit rays (h, w, 3) of the pixels, or of places beside them."""
-        x = self.columns + 0.5 + right
-        y = self.rows + 0.5 + below
-        return np.asarray(self.lens.rays(x[None, :], y[:, None]))
+        # All views ask for the same few, and some lenses compute them slowly.
+        key = (right, below)
+        if key not in self._rays:
+            x = self.columns + 0.5 + right
+            y = self.rows + 0.5 + below
+            self._rays[key] = np.asarray(self.lens.rays(x[None, :], y[:, None]))
+        return self._rays[key]
 
     def of(self, image: Floats, right: int = 0, below: int = 0) -> Floats:
         """Return an image's values at the pixels, or at pixels beside them. Repeats its edges."""
@@ -251,7 +257,7 @@ def _gaussians(
     return Gaussians(
         positions[owned],
         scales,
-        _quaternions(turn @ axes),
+        matrix_to_quaternion(turn @ axes),
         harmonics_of(colours),
         opacity * samples.alpha.ravel()[pixels[owned]],
     )
@@ -334,13 +340,6 @@ def _axes(
     axes, scales, _ = np.linalg.svd(edges)
     axes[np.linalg.det(axes) < 0, :, 0] *= -1
     return np.maximum(scales, 1e-7), axes
-
-
-def _quaternions(matrices: Floats) -> Floats:
-    """Return rotation matrices (n, 3, 3) as quaternions (n, 4): w, x, y, z."""
-    from scipy.spatial.transform import Rotation
-
-    return np.roll(Rotation.from_matrix(matrices).as_quat(), 1, axis=1)
 
 
 def _evenly(side: int, step: float) -> NDArray[np.intp]:

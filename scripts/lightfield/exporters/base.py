@@ -206,6 +206,15 @@ def angle(lens: Equidistant) -> str:
     return f"sees {math.degrees(lens.fov):g} degrees"
 
 
+def tracked_points() -> Any:
+    """Return the field `points` of an export in which each image has points that it sees."""
+    return Field(
+        50000,
+        description="Largest number of points, which are computed from depth. An image in which "
+        "none of them lies gets one more.",
+    )
+
+
 def sideways_refusal(lens: Lens, program: str) -> str | None:
     """Return why a program whose lenses end below 180° cannot take a lens. None if it can."""
     if isinstance(lens, Equidistant) and lens.fov >= math.pi:

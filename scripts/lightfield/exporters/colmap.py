@@ -43,6 +43,7 @@ from lightfield.exporters.base import (
     ForTraining,
     PointCount,
     sideways_refusal,
+    tracked_points,
 )
 from lightfield.formats.lightfield import View
 from lightfield.geometry.colmap import pose, relative_pose
@@ -102,11 +103,7 @@ class ColmapModel(ForTraining):
     """The options of exports that are COLMAP models."""
 
     format: Literal["binary", "text"] = Field("binary", description="Form of COLMAP's files.")
-    points: PointCount = Field(
-        50000,
-        description="Largest number of points, which are computed from depth. An image in which "
-        "none of them lies gets one more.",
-    )
+    points: PointCount = tracked_points()
     depth: bool = Field(False, description="Also write depth maps. The source must have depth.")
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:

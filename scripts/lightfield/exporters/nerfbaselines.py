@@ -14,14 +14,18 @@ cameras.py of nerfbaselines.
 
 from pathlib import Path
 
-from pydantic import Field
-
 from lightfield.core.files import write_json, write_text
 from lightfield.export import heads
 from lightfield.export.pictures import write_pictures
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import TO_RECTILINEAR, ForTraining, PointCount, sideways_refusal
+from lightfield.exporters.base import (
+    TO_RECTILINEAR,
+    ForTraining,
+    PointCount,
+    sideways_refusal,
+    tracked_points,
+)
 from lightfield.exporters.colmap import model
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.brown_conrady import BrownConrady
@@ -38,11 +42,7 @@ class NerfBaselines(ForTraining):
     chooses_tests = True
     needs_surfaces = True
 
-    points: PointCount = Field(
-        50000,
-        description="Largest number of points, which are computed from depth. An image in which "
-        "none of them lies gets one more.",
-    )
+    points: PointCount = tracked_points()
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if not isinstance(lens, Rectilinear | BrownConrady):

@@ -12,13 +12,11 @@ import math
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-
 from lightfield.core.files import write_json
 from lightfield.export.pictures import write_pictures
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
-from lightfield.exporters.base import ForTraining, PointCount, angle
+from lightfield.exporters.base import ForTraining, PointCount, angle, tracked_points
 from lightfield.exporters.colmap import model
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
@@ -36,11 +34,7 @@ class ScanNetPP(ForTraining):
     chooses_tests = True
     needs_surfaces = True
 
-    points: PointCount = Field(
-        50000,
-        description="Largest number of points, which are computed from depth. An image in which "
-        "none of them lies gets one more.",
-    )
+    points: PointCount = tracked_points()
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant):

@@ -5,7 +5,7 @@ Source: COLMAP's format.rst.
 
 import numpy as np
 
-from lightfield.geometry.rotations import Floats, quaternion_to_matrix
+from lightfield.geometry.rotations import Floats, matrix_to_quaternion, quaternion_to_matrix
 
 # From Blender's camera (y up, looks along −z) to COLMAP's (y down, looks along z).
 _FLIP = np.diag([1.0, -1.0, -1.0])
@@ -13,12 +13,8 @@ _FLIP = np.diag([1.0, -1.0, -1.0])
 
 def pose(world_from_camera: Floats) -> tuple[list[float], list[float]]:
     """Return the quaternion (w, x, y, z) and the translation of a camera-to-world matrix (4, 4)."""
-    # SciPy takes long to import, and no plan needs it.
-    from scipy.spatial.transform import Rotation
-
     turn = _FLIP @ world_from_camera[:3, :3].T
-    x, y, z, w = Rotation.from_matrix(turn).as_quat().tolist()
-    return [w, x, y, z], (-turn @ world_from_camera[:3, 3]).tolist()
+    return matrix_to_quaternion(turn).tolist(), (-turn @ world_from_camera[:3, 3]).tolist()
 
 
 def relative_pose(first_from_other: Floats) -> tuple[list[float], list[float]]:

@@ -79,6 +79,14 @@ def quaternion_to_matrix(quaternion: Floats) -> Floats:
     return matrix
 
 
+def matrix_to_quaternion(matrix: Floats) -> Floats:
+    """Return unit quaternions (…, 4), in the order w, x, y, z, of rotations (…, 3, 3)."""
+    # SciPy takes long to import, and no plan needs it.
+    from scipy.spatial.transform import Rotation
+
+    return np.roll(Rotation.from_matrix(matrix).as_quat(), 1, axis=-1)
+
+
 def looking_at(positions: Floats, target: Floats, up: Sequence[float] = (0.0, 0.0, 1.0)) -> Floats:
     """Return the rotations (n, 3, 3) of cameras at ``positions`` (n, 3) that look at a point (3,).
 

@@ -6,22 +6,18 @@ import numpy as np
 
 from lightfield.core import units
 from lightfield.core.errors import UserError
-from lightfield.core.files import absolute_path, write_json
+from lightfield.core.files import write_json
 from lightfield.formats.layout import IMAGES
 from lightfield.formats.lightfield import LightField
+from lightfield.products.scene_list import read_lightfields
 from lightfield.stages.views import ListHeads
 
 
 def write_heads(job: ListHeads) -> None:
     """Write the heads of the rigs. Raises `UserError` for a rig outside the scene's folder."""
-    scene = absolute_path(job.output).parent
     heads: dict[str, Any] = {}
-    for path in job.lightfields:
-        lightfield = LightField.read(path)
-        folder = absolute_path(path).parent
-        if not folder.is_relative_to(scene):
-            raise UserError(f"{lightfield.path}: must be in {scene}, where --output is")
-        _add(heads, lightfield, folder.relative_to(scene).as_posix())
+    for folder, lightfield in read_lightfields(job.lightfields, job.output).items():
+        _add(heads, lightfield, folder)
     for head in heads.values():
         head["frames"] = [*head["frames"].values()]
     write_json(job.output, heads)

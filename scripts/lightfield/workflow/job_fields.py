@@ -78,25 +78,23 @@ def lightfield(dataset: Dataset) -> Fields:
 
 @_of_dataset
 def check_cameras(dataset: Dataset) -> Fields | None:
-    if dataset.cameras is None:
-        return None
-    return {
-        "blend": dataset.blend,
-        "lightfield": dataset.paths.lightfield,
-        "inventory": dataset.blend_inventory,
-        "output": dataset.cameras,
-    }
+    return _of_cameras_in_scene(dataset, dataset.cameras)
 
 
 @_of_dataset
 def corners(dataset: Dataset) -> Fields | None:
-    if dataset.corners is None:
+    return _of_cameras_in_scene(dataset, dataset.corners)
+
+
+def _of_cameras_in_scene(dataset: Dataset, output: str | None) -> Fields | None:
+    """Return the fields of a job that opens the scene with the cameras in it."""
+    if output is None:
         return None
     return {
         "blend": dataset.blend,
         "lightfield": dataset.paths.lightfield,
         "inventory": dataset.blend_inventory,
-        "output": dataset.corners,
+        "output": output,
     }
 
 
