@@ -8,6 +8,7 @@ own class alone.
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -50,6 +51,8 @@ class RayTable:
         return bool(np.abs(self.angles).max() < math.pi / 2)
 
 
+# A build checks the lens of each rig, and rigs often share one.
+@cache
 def ray_table(lens: RadialLens) -> RayTable:
     """Return the table of a lens. Raises `UserError` if it errs by more than `LARGEST_ERROR`."""
     # Where a lens has no value, it gives NaN.
