@@ -387,6 +387,10 @@ def pass_channels(
         planes = np.moveaxis(colour.passes[view_pass.name], -1, 0)
         named = dict(zip(view_pass.channels, planes, strict=True))
         return named, passes.matte_header(colour.manifest)
+    if view_pass.kind == "variance":
+        planes = np.moveaxis(colour.passes[view_pass.name], -1, 0)
+        attributes = {images.NAN_ATTRIBUTE: int(np.isnan(planes).sum())}
+        return dict(zip(view_pass.channels, np.nan_to_num(planes, nan=0), strict=True)), attributes
     if view_pass.of_colour:
         channels, attributes = colour_channels(colour.passes[view_pass.name])
         numbers = [np.nan_to_num(plane, nan=0) for plane in channels.values()]
