@@ -1,8 +1,8 @@
 """Renders views with the pass `variance` and without it.
 
 Run by test_variance.py in a process of its own, because bpy has one scene at a time:
-variance_renders.py FOLDER writes FOLDER/<case>.npz for each case, FOLDER/parts.npz, FOLDER/<room>.npz for
-each room, and the dataset FOLDER/dataset.
+variance_renders.py FOLDER writes the dataset FOLDER/dataset, FOLDER/parts.npz, and an .npz of each
+case and of each room.
 """
 
 import sys

@@ -45,9 +45,9 @@ def render_in_parts(
     for name, divisor in divisors.items():
         divided, by = mean.passes[name], mean.passes[divisor]
         mean.passes[name] = np.divide(divided, by, out=np.zeros_like(divided), where=by != 0)
-    mean_passes = {name: np.float32(pixels) for name, pixels in mean.passes.items()}
+    mean_passes = {name: pixels.astype(np.float32) for name, pixels in mean.passes.items()}
     view = Rendered(mean_passes, part.attributes, seconds, synchronization_seconds)
-    return view, np.float32(mean.colour_variance)
+    return view, mean.colour_variance.astype(np.float32)
 
 
 def _parts() -> Iterator[int]:
