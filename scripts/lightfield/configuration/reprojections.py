@@ -262,7 +262,7 @@ class ReprojectionEntry(ReprojectionOptions):
         lights = [
             name
             for name in self.passes or ()
-            if name == LIGHT_GROUPS or PASSES[name].kind == "light"
+            if name == LIGHT_GROUPS or PASSES[name].kind in ("light", "variance")
         ]
         if self.primaries == "acescg" and lights:
             raise ValueError(f"primaries: does not go with the pass {lights[0]}, which is Rec. 709")

@@ -18,7 +18,7 @@ from pydantic import (
 )
 
 from lightfield.formats import light_groups, passes
-from lightfield.formats.passes import PASSES, Pass
+from lightfield.formats.passes import PASSES, SAMPLE_PARTS, VARIANCE, Pass
 from lightfield.settings.base import AS_WRITTEN, Settings, Vector, checked
 from lightfield.settings.types import AtLeastOne, DenoisePrefilter, unique_names
 
@@ -201,6 +201,16 @@ class RenderOptions(Settings):
         "passes of their own. each: all of them. A list: the sources with these names. A mapping: "
         "groups of them. All others form the group rest.",
     )
+
+    @property
+    def has_variance(self) -> bool:
+        """Whether the views have a pass of their variance, so that they must have no bias."""
+        return VARIANCE in (self.passes or ())
+
+    @property
+    def fewest_samples(self) -> int:
+        """The fewest samples that a pixel may have."""
+        return SAMPLE_PARTS if self.has_variance else 1
 
 
 class RenderBlock(RenderOptions):

@@ -1,4 +1,4 @@
-"""Reprojects passes: light as colour, normals as unit vectors, ids and mattes unmixed.
+"""Reprojects passes: light as colour, normals as unit vectors, all others unmixed.
 
 Light groups are scaled so that they still add up to the colour.
 """
@@ -139,8 +139,9 @@ def _resampled(planes: list[Array], view_pass: Pass, lens_map: LensMap) -> Array
     # A float holds every id exactly. Missing channels repeat the others.
     red, green, blue = (windows * 3)[:3]
     source = widen(red, green, blue)
-    if view_pass.kind in ("id", "matte"):
-        # An id cannot be mixed: take the ray through each pixel's centre.
+    if view_pass.kind in ("id", "matte", "variance"):
+        # An id cannot be mixed, and a mean of variances is not the variance of a mean. So take the
+        # ray through each pixel's centre.
         has_source = ~np.isnan(lens_map.centers[..., 0])
         lens_map = replace(
             lens_map,
