@@ -308,9 +308,12 @@ REFUSED = [
             {"sources": ["perspective"]},
             f"exports.{name}.sources: perspective: the rig LFSphere has fewer than two frames",
         )
-        for name in ("dnerf", "colmap_frames", "multipleview")
+        for name in ("dnerf", "colmap_frames", "multipleview", "ncore_frames")
     ),
-    ("exports.neural_3d_video", {"sources": ["perspective"], "rate": 0}),
+    *(
+        (f"exports.{name}", {"sources": ["perspective"], "rate": 0})
+        for name in ("neural_3d_video", "miv_frames", "opendibr_frames", "ncore_frames")
+    ),
     ("exports.scene_flow", {"sources": ["perspective"]}, "exports.scene_flow.sources: perspective"),
     ("exports.coco", {"sources": ["views"]}, "exports.coco.sources: views lacks the pass object"),
     *(("mesh", value) for value in (None, True, "glb", [])),

@@ -31,13 +31,16 @@ from oracles.readers import (
     lichtfeld,
     mesh,
     miv,
+    miv_frames,
     multipleview,
     ncore,
+    ncore_frames,
     nerf_synthetic,
     nerfbaselines,
     nerfstudio,
     neural_3d_video,
     opendibr,
+    opendibr_frames,
     point_cloud,
     poses_csv,
     scannetpp,
@@ -72,8 +75,11 @@ WITHOUT_VIEWS = ("coco", "mesh", "point_cloud", "splat")
 SEQUENCE_READERS = {
     "colmap_frames": colmap_frames.read,
     "dnerf": dnerf.read,
+    "miv_frames": miv_frames.read,
     "multipleview": multipleview.read,
+    "ncore_frames": ncore_frames.read,
     "neural_3d_video": neural_3d_video.read,
+    "opendibr_frames": opendibr_frames.read,
     "scene_flow": scene_flow.read,
 }
 
