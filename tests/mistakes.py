@@ -590,6 +590,7 @@ REFUSED = [
             ("instant_ngp", "render_aabb", [[0, 0, 0]]),
             ("instant_ngp", "render_aabb", [[1, 1, 1], [0, 0, 0]]),
             ("wai", "exposure", 101),
+            ("dust3r", "overlap", 1.1),
             ("opendibr", "format", "mp4"),
             ("ncore", "points", 0),
             ("lichtfeld", "format", "jpg"),

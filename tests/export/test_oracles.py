@@ -64,6 +64,7 @@ EXPORTS = {
         "ncore": {"points": 60},
         "poses_csv": {},
         "wai": {},
+        "dust3r": {},
     },
     "shifted": {
         "colmap": {"points": 60},
@@ -71,6 +72,7 @@ EXPORTS = {
         "opendibr": {},
         "miv": {},
         "wai": {},
+        "dust3r": {"overlap": 0.5},
     },
     "fisheye": {
         "colmap": {"points": 60},

@@ -26,6 +26,7 @@ from oracles.readers import (
     colmap,
     colmap_frames,
     dnerf,
+    dust3r,
     hci,
     instant_ngp,
     lichtfeld,
@@ -53,6 +54,7 @@ from oracles.readers.contents import Exported
 READERS = {
     "coco": coco.read,
     "colmap": colmap.read,
+    "dust3r": dust3r.read,
     "hci": hci.read,
     "lichtfeld": lichtfeld.read,
     "mesh": mesh.read,
