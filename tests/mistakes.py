@@ -547,6 +547,7 @@ REFUSED = [
     *(("render.camera_motion", {"turn": value}) for value in ([0, 180, 0], [0, 1], 5)),
     *(("render.camera_motion", {"travel": [1, 0, 0], "rolling": value}) for value in (0, 1.5)),
     *(("reprojections.perspective.primaries", value) for value in ("acescg", "ACEScg", 7)),
+    *(("reprojections.perspective.compression", value) for value in ("zip", "ZIP", "dwaa", 1)),
     *(("reprojections.perspective.look", value) for value in ("agx", None, 7, "Raw - Punchy")),
     *(("sensor", value) for value in ("noise", None, [], {"gain": 1})),
     *(("sensor.sources", value) for value in ([], "views", ["view"], ["views", "views"])),
@@ -997,6 +998,11 @@ EXPLAINED = [
         "reprojections.perspective.primaries",
         "rec709",
         "reprojections.perspective.primaries: is only for format exr; a PNG is sRGB",
+    ),
+    (
+        "reprojections.perspective.compression",
+        "htj2k",
+        "reprojections.perspective.compression: is only for EXR files: format exr, or passes",
     ),
     (
         "reprojections.perspective.look",
