@@ -197,6 +197,37 @@ def test_opendibr_s_videos_are_coded_in_the_order_of_time_and_have_equal_bytes(s
         assert (again / path.name).read_bytes() == path.read_bytes()
 
 
+def dynamic_points(camera, levels):
+    """Return the points of all pixels, as dyn-lf-renderer's depth_processor.py computes them.
+
+    ``levels`` (h, w) have 10 bits.
+    """
+    near, far = camera["Depth_range"]
+    z = 1 / (1 / far + levels / 1023 * (1 / near - 1 / far))
+    (fx, fy), (cx, cy) = camera["Focal"], camera["Principal_point"]
+    width, height = camera["Resolution"]
+    x = z * ((np.arange(width) + 0.5 - cx) / fx)
+    y = z * ((np.arange(height) + 0.5 - cy) / fy).reshape(-1, 1)
+    points = np.stack([x, y, z, np.ones_like(z)], axis=-1) @ np.transpose(camera["model"])
+    return points[..., :3]
+
+
+@pytest.mark.parametrize("lens", ["perspective", "shifted", "panorama"])
+def test_dyn_lf_renderer_gets_its_own_list_of_perspective_videos(sequences, tmp_path, lens):
+    folder = exported(sequences[lens], "opendibr_frames", tmp_path, **RATE)
+    path = folder / "opendibr_frames.json"
+    assert path.exists() == (lens != "panorama")
+    cameras = json.loads(path.read_text())["cameras"] if path.exists() else []
+    for camera in cameras:
+        assert (folder / camera["NameColor"]).is_file()
+        # Its script decompress_depth.sh makes 10 bits of these.
+        depth = decoded(folder / camera["NameDepth"], camera, 10)
+        for index in range(6):
+            points = dynamic_points(camera, depth[index].astype(float))
+            points = np.stack([points[..., 0], -points[..., 2], points[..., 1]], axis=-1)
+            assert_shows(points, index, 0.03)
+
+
 def ncore_points(store, time):
     """Return the points and the colours that the lidar measures at a time."""
     frame = f"lidars/points/frames/{time}"

@@ -30,7 +30,7 @@ from lightfield.geometry.rotations import matrix_to_euler
 from lightfield.imaging import images
 
 # Rows: the axes of OpenGL's world in ours.
-_TO_OPENGL = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+TO_OPENGL = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 # Suffix, bits of colour, and bits of depth.
 _PICTURES = {"png": (".png", 8, 16), "h265": (".mp4", 10, 12)}
 LOADER = "./RealtimeDIBR -i {} -j {}/cameras.json"
@@ -53,8 +53,8 @@ class OpenDibrViews(Developed):
         pictures: Literal["png", "h265"],
         folder: Path,
         rate: float | None = None,
-    ) -> None:
-        """Write the views of the ``frames`` of still cameras into ``folder``.
+    ) -> list[dict[str, Any]]:
+        """Write the views of the ``frames`` of still cameras into ``folder``. Return their entries.
 
         Several frames must be H.265, with ``rate`` of them a second.
         """
@@ -87,6 +87,7 @@ class OpenDibrViews(Developed):
             progress.done()
         farther.report(folder)
         write_json(folder / "cameras.json", {"Axial_system": "OPENGL", "cameras": camera_entries})
+        return camera_entries[1:]
 
 
 class OpenDibr(OpenDibrViews):
@@ -138,9 +139,9 @@ def _write_videos(
 
 def pose(world_from_camera: Floats) -> dict[str, list[float]]:
     """Return the keys of a camera-to-world matrix (4, 4): metres, and XYZ Euler degrees."""
-    angles = matrix_to_euler(_TO_OPENGL @ world_from_camera[:3, :3])
+    angles = matrix_to_euler(TO_OPENGL @ world_from_camera[:3, :3])
     return {
-        "Position": (_TO_OPENGL @ world_from_camera[:3, 3]).tolist(),
+        "Position": (TO_OPENGL @ world_from_camera[:3, 3]).tolist(),
         "Rotation": np.degrees(angles).tolist(),
     }
 
