@@ -20,10 +20,11 @@ from pydantic import Field
 
 from lightfield.core.errors import UserError
 from lightfield.core.progress import Progress
-from lightfield.export import cameras, covisibility, heads, npz
+from lightfield.export import cameras, covisibility, heads
 from lightfield.export.pictures import write_z
 from lightfield.export.source import SourceDataset
 from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, Developed, Joined
+from lightfield.formats import npz
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear

@@ -13,17 +13,15 @@ its shape by its name. The key last_modified is left out, so that equal views gi
 Sources: MapAnything's data_processing/README.md, utils/wai and datasets/wai.
 """
 
-import io
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from lightfield.core.files import absolute_path, write_bytes, write_json
 from lightfield.export import cameras, covisibility, heads
 from lightfield.export.pictures import write_pictures, write_z
 from lightfield.export.source import SourceDataset
 from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, Developed, Joined
+from lightfield.formats import npz
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -116,7 +114,5 @@ def _write_covisibility(source: SourceDataset, folder: Path) -> str:
     """Write the shares of pixels that views see of each other. Return the file's path."""
     shares = covisibility.shares(source)
     path = f"covisibility/v0/pairwise_covisibility--{len(shares)}x{len(shares)}.npy"
-    content = io.BytesIO()
-    np.save(content, shares)
-    write_bytes(folder / path, content.getvalue())
+    write_bytes(folder / path, npz.npy(shares))
     return path

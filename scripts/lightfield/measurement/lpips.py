@@ -5,7 +5,6 @@ Features as a Perceptual Metric", as in their package lpips, version 0.1. No pac
 weights of the networks, so a file brings them: the state dict of the package's class LPIPS.
 """
 
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from lightfield.core.errors import UserError
+from lightfield.formats import npz
 
 Floats = NDArray[np.float32]
 
@@ -139,12 +139,9 @@ class Lpips:
 def read(path: Path) -> Lpips:
     """Return LPIPS with the weights in an NPZ file. Raises `UserError` if it has others."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            weights = {key: np.asarray(file[key]) for key in file.files}
-    except (OSError, ValueError, EOFError, AttributeError, zipfile.BadZipFile) as error:
-        if isinstance(error, OSError) and error.strerror:
-            raise UserError(f"{path}: cannot be read: {error.strerror}") from error
-        raise UserError(f"{path}: is not an NPZ file of arrays; make it by {RECIPE}") from error
+        weights = npz.read(path)
+    except UserError as error:
+        raise UserError(f"{error}; make it by {RECIPE}") from None
     shapes = {key: array.shape for key, array in weights.items() if array.dtype.kind == "f"}
     for name, net in _ARCHITECTURES.items():
         if net.shapes.items() <= shapes.items():
