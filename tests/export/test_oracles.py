@@ -60,6 +60,9 @@ EXPORTS = {
         "opendibr": {},
         "miv": {},
         "hci": {},
+        "focal_stack": {"distances": [2, 3]},
+        "quilt": {"focus": 3, "tiles": [2, 2], "aspect": 0.75},
+        "epipolar_volumes": {"depth": True},
         "lichtfeld": {"points": 60, "depth": True, "format": "exr"},
         "ncore": {"points": 60},
         "poses_csv": {},
@@ -70,6 +73,8 @@ EXPORTS = {
         "nerfstudio": {"points": 60},
         "opendibr": {},
         "miv": {},
+        "focal_stack": {"format": "exr", "aperture": 0.4},
+        "quilt": {"focus": 3, "row": 1},
         "wai": {},
     },
     "fisheye": {

@@ -26,6 +26,8 @@ from oracles.readers import (
     colmap,
     colmap_frames,
     dnerf,
+    epipolar_volumes,
+    focal_stack,
     hci,
     instant_ngp,
     lichtfeld,
@@ -40,6 +42,7 @@ from oracles.readers import (
     opendibr,
     point_cloud,
     poses_csv,
+    quilt,
     scannetpp,
     scene_flow,
     splat,
@@ -50,6 +53,8 @@ from oracles.readers.contents import Exported
 READERS = {
     "coco": coco.read,
     "colmap": colmap.read,
+    "epipolar_volumes": epipolar_volumes.read,
+    "focal_stack": focal_stack.read,
     "hci": hci.read,
     "lichtfeld": lichtfeld.read,
     "mesh": mesh.read,
@@ -61,12 +66,21 @@ READERS = {
     "opendibr": opendibr.read,
     "point_cloud": point_cloud.read,
     "poses_csv": poses_csv.read,
+    "quilt": quilt.read,
     "scannetpp": scannetpp.read,
     "splat": splat.read,
     "wai": wai.read,
 }
 
-WITHOUT_VIEWS = ("coco", "mesh", "point_cloud", "splat")
+WITHOUT_VIEWS = (
+    "coco",
+    "epipolar_volumes",
+    "focal_stack",
+    "mesh",
+    "point_cloud",
+    "quilt",
+    "splat",
+)
 """The exports that have no poses of views."""
 
 SEQUENCE_READERS = {
