@@ -1,6 +1,7 @@
 """Arrays of the views of a rig, and epipolar_volumes.json, which says what their axes are."""
 
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,16 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
                 shapes[entry["depth"]] = picture
             for name, shape in shapes.items():
                 file = path.parent / str(name)
-                exported.expect(f"{file}: shape", np.load(file, mmap_mode="r").shape, shape)
+                exported.expect(f"{file}: shape", _shape_of(file), shape)
             exported.expect(f"{path}: axes", len(entry["axes"]), views.ndim + 3)
             exported.expect(f"{path}: positions", np.shape(entry["positions"]), (*views.shape, 3))
     return exported
+
+
+def _shape_of(path: Path) -> tuple[int, ...]:
+    """Return the shape of an array that fills its file."""
+    try:
+        shape: tuple[int, ...] = np.load(path, mmap_mode="r").shape
+    except (EOFError, SyntaxError, TokenError) as error:
+        raise ValueError(str(error)) from None
+    return shape
