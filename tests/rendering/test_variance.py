@@ -69,8 +69,8 @@ def estimated_and_true(path):
 
 def test_the_estimate_is_the_variance_over_seeds_where_noise_is_rare_bright_paths(made):
     estimated, true = estimated_and_true(made / "lamp behind a board.npz")
-    # Over 100 seeds, the standard error of the ratio is 0.01.
-    assert 1 < estimated.mean() / true.mean() < 1.15
+    # Over 100 seeds, the standard error of the ratio is 0.02.
+    assert 0.95 < estimated.mean() / true.mean() < 1.2
 
 
 def test_the_estimate_is_too_large_where_samples_avoid_each_other(made):
