@@ -12,7 +12,7 @@ import numpy as np
 from lightfield.formats.passes import Pass, is_group
 from lightfield.geometry.lenses import Array
 from lightfield.imaging.halves import widen
-from lightfield.imaging.images import HALF_MAX, KEY_ATTRIBUTE, Image, read_image, write_exr
+from lightfield.imaging.images import HALF_MAX, KEY_ATTRIBUTE, Image, read_image
 from lightfield.reprojection import kernels
 from lightfield.reprojection.colour import resample_colour
 from lightfield.reprojection.job import ReprojectionJob, SourceView
@@ -49,7 +49,7 @@ def write_passes(
             for name, value in image.attributes.items()
             if name.startswith("cryptomatte/")
         }
-        write_exr(path, channels, header | {KEY_ATTRIBUTE: key})
+        job.write_exr(path, channels, header | {KEY_ATTRIBUTE: key})
         shard_log.add(path, key)
 
 

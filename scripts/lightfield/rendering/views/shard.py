@@ -61,7 +61,7 @@ def render(job: RenderShard) -> None:
     """
     lightfield = LightField.read(job.lightfield)
     folder = job.output
-    images.check_codec(lightfield.render.compression or "zip")
+    images.check_codec("render.compression", lightfield.render.compression or "zip")
     # Remove leftovers on the render node: shared memory of killed jobs may fill its RAM.
     leftovers.remove()
     history = History()
