@@ -134,6 +134,11 @@ soak: .venv/complete
 		> $(@D)/lib/python$(VERSION)/site-packages/others.pth
 	@touch $@
 
+# For Slurm.
+.venv/complete-with-slurm: .venv/complete envs/requirements-slurm-3.13.txt envs/requirements-slurm-3.11.txt
+	@$(PIP) install --require-hashes -r envs/requirements-slurm-$(VERSION).txt
+	@touch $@
+
 # For machines without a common folder.
 .venv/complete-with-storage: .venv/complete envs/requirements-storage-3.13.txt envs/requirements-storage-3.11.txt
 	@$(PIP) install --require-hashes -r envs/requirements-storage-$(VERSION).txt
@@ -157,7 +162,7 @@ soak: .venv/complete
 locks:
 	for version in 3.13 3.11; do \
 		$(LOCK) --python-version $$version envs/requirements-test.in -o envs/requirements-test-$$version.txt && \
-		for lock in requirements requirements-storage; do \
+		for lock in requirements requirements-slurm requirements-storage; do \
 			$(LOCK) --python-version $$version envs/$$lock.in \
 				--constraints envs/requirements-test-$$version.txt -o envs/$$lock-$$version.txt || exit; \
 		done; \
