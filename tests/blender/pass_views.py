@@ -31,7 +31,7 @@ LENSES = {
     "panorama": {"lens": "equirectangular", "resolution": [2 * SIZE, SIZE]},
 }
 RENDER = {
-    "samples": 4,
+    "samples": 8,
     "adaptive_threshold": 0,
     "denoise": False,
     "seed": 0,

@@ -667,6 +667,8 @@ EXPORTS = {
     "poses_csv": {},
     "point_cloud": {"voxel": 0.1},
     "wai": {},
+    "focal_stack": {},
+    "epipolar_volumes": {"depth": True},
 }
 PICTURES = {".png", ".exr", ".yuv", ".mp4"}
 

@@ -58,6 +58,7 @@ FRAMES = {1: look, 2: look_at_ball, 5: look_at_ball}
 SEQUENCE = {
     "dnerf": {"points": 20000},
     "neural_3d_video": {"points": 20000},
+    "ncore_frames": {"points": 20000, "rate": 24},
 }
 
 
