@@ -3,6 +3,8 @@
 export.py calls it, and each.py reads what it writes.
 """
 
+import shutil
+
 import numpy as np
 from sphere import LENSES, enlarged, look, write_views
 
@@ -31,6 +33,7 @@ OF_VIEWS = {
     "coco": {"segmentation": True},
     "colmap": {"points": 2000, "depth": True},
     "dust3r": {},
+    "epipolar_volumes": {"depth": True},
     "hci": {},
     "kalibr": {},
     "lichtfeld": {"points": 2000, "depth": True},
@@ -49,10 +52,15 @@ OF_FISHEYES = {"scannetpp": {"points": 2000}}
 OF_SEQUENCE = {
     "colmap_frames": {"points": 2000},
     "dnerf": {"points": 2000},
+    "miv_frames": {},
     "multipleview": {"points": 2000},
+    "ncore_frames": {"points": 2000},
     "neural_3d_video": {"points": 2000},
+    "opendibr_frames": {},
     "scene_flow": {},
 }
+# These need ffmpeg.
+VIDEOS = ("neural_3d_video", "opendibr_frames")
 # Metres that the scene of the sequence moves from one frame to the next.
 MOVES = np.array([0.05, -0.02, 0.03])
 FRAMES = 2
@@ -128,6 +136,9 @@ def write_sequence(folder):
     frames = [f"f{number + 1:05}" for number in range(FRAMES)]
     source = SourceSequence.of_folders(sequence, frames, "", ".exr", {})
     for kind, options in OF_SEQUENCE.items():
+        if kind in VIDEOS and shutil.which("ffmpeg") is None:
+            print(f"{kind}: is not written, because ffmpeg is not installed")
+            continue
         export(kind, source, folder, options)
 
 
