@@ -23,6 +23,8 @@ from lightfield.rendering.views.geometry_pass import render_geometry
 
 FOLDER = Path(sys.argv[1])
 SIZE = 32
+# The rooms are rendered often.
+ROOM_SIZE = 16
 SAMPLES = 64
 SEEDS = 100
 OTHERS = [name for name in PASSES if name != VARIANCE]
@@ -97,8 +99,8 @@ def build_room(name, bounces):
     blend_file.save_scene(FOLDER / f"{name}.blend")
 
 
-def lightfield(**render):
-    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [SIZE, SIZE]})
+def lightfield(size=SIZE, **render):
+    lens = lenses.from_camera({"lens": "rectilinear", "fov": 60, "resolution": [size, size]})
     rig = {"type": "lattice", "cameras": [1, 1, 1], "center": [0, 0, 0.8], "size": 0}
     block = {"samples": SAMPLES, "adaptive_threshold": 0, "denoise": False, "seed": 0, **render}
     return LightField.from_rig(rig, lens, depth="z", frame=1, scene={}, render=block)
@@ -154,7 +156,7 @@ def write_parts():
 
 def write_seeds(scene):
     """Write the colour and the pass of a view for each of many seeds."""
-    content = lightfield(passes=[VARIANCE])
+    content = lightfield(ROOM_SIZE, passes=[VARIANCE])
     opened, pose = set_up(content, scene)
     views = [render_colour(opened, pose, 1000 + seed, content.passes) for seed in range(SEEDS)]
     np.savez(
