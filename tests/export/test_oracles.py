@@ -67,6 +67,7 @@ EXPORTS = {
         "ncore": {"points": 60},
         "poses_csv": {},
         "wai": {},
+        "dust3r": {},
     },
     "shifted": {
         "colmap": {"points": 60},
@@ -76,6 +77,7 @@ EXPORTS = {
         "focal_stack": {"format": "exr", "aperture": 0.4},
         "quilt": {"focus": 3, "row": 1},
         "wai": {},
+        "dust3r": {"overlap": 0.5},
     },
     "fisheye": {
         "colmap": {"points": 60},

@@ -480,6 +480,20 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
     assert "normal/" in tab.locator("#files").inner_text()
 
 
+def test_the_noise_is_the_error_that_the_variance_says(tmp_path):
+    """All colours are equal, so that middle grey is 0.18. The standard deviation is a tenth."""
+    grey = np.full((48, 64, 3), 3.0, np.float32)
+    lightfield = write_dataset(tmp_path, LINE, see=lambda lens, pose: (grey, look(lens, pose)[1]))
+    render = lightfield.render.changed(passes=["variance"])
+    lightfield.changed(render=render.to_json()).write(tmp_path / "lightfield.json")
+    for view in lightfield.views:
+        planes = dict.fromkeys("RGB", np.full(grey.shape[:2], 0.3**2, np.float32))
+        images.write_exr(PASSES["variance"].path(tmp_path, view.name), planes)
+    text = make_page(tmp_path, LINE).read_text()
+    # 0.018² / (0.18² + 0.01)
+    assert "relative mean squared error 0.0076" in text
+
+
 def test_a_scene_at_rest_has_a_white_picture_of_motion(tmp_path):
     lightfield = write_dataset(tmp_path, LINE)
     render = lightfield.render.changed(passes=["motion"])

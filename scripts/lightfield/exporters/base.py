@@ -32,6 +32,16 @@ EXPORTERS: dict[str, "type[Export]"] = {}
 """All exporters by their names."""
 
 PointCount = Annotated[int, Field(ge=1)]
+AnimationRate = Annotated[
+    float,
+    Field(
+        gt=0,
+        le=1000,
+        description="Frames of the animation in a second. If the rig leaves out frames, the export "
+        "has fewer in a second.",
+        json_schema_extra={"unit": "Hz"},
+    ),
+]
 Metres = Annotated[float, Field(gt=0, le=FARTHEST)]
 # Refusals of views without depth. What to do depends on the source, so scene_checks/exports.py
 # adds it.
