@@ -8,8 +8,9 @@ unity, magnified by 3. CPU time a view is reading, resampling and writing, EXR t
 Batches (--batch N): N views of 2048 x 2048 pixels with half R G B and Z are the input. The jobs are
 EXR with depth at the same size, and PNG at an eighth. The programs are scripts/reproject.py with
 its default filter and with st_warp, a bare read and write of the same files, and --peer. All CPU
-time counts, also for the start and the lens map, divided by the views. We compress at zlib's level
-4. SILVR's tool has level 9 in its source: most of its time goes into 3 % fewer bytes.
+time counts, also for the start and the lens map, divided by the views. We compress EXRs at zip's
+level 1, and PNGs at zlib's level 4. SILVR's tool has level 9 in its source: most of its time goes
+into 3 % fewer bytes.
 
 --peer PATH adds a program that takes the flags of SILVR's reprojection tool. Writes
 reprojection.csv, reprojection_batches.csv, reprojection.svg and reprojection.png into the output
@@ -47,6 +48,7 @@ from lightfield.imaging.plots import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VER
 from lightfield.measurement.metrics import pareto
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.colour import resample_colour
+from lightfield.reprojection.job import ZIP_LEVEL
 
 try:
     import cv2
@@ -264,7 +266,7 @@ def read_and_write(source: Path, target: Path, lens: Lens) -> None:
     columns = np.arange(lens.width) % wide.shape[1]
     half = np.empty((3, lens.height, lens.width), np.float16)
     narrow(np.ascontiguousarray(wide[rows][:, columns]), half)
-    images.write_exr(target, dict(zip("RGB", half, strict=True)))
+    images.write_exr(target, dict(zip("RGB", half, strict=True)), level=ZIP_LEVEL)
 
 
 def best_cpu(function: Callable[[], Any], arguments: argparse.Namespace) -> float:
@@ -448,7 +450,7 @@ def bare(folder: Path, small: bool) -> float:
             pixels = np.dstack([array[:side, :side] for array in channels.values()])
             images.write_png(folder / "bare.png", (pixels * 100).astype(np.uint8))
         else:
-            images.write_exr(folder / "bare.exr", channels)
+            images.write_exr(folder / "bare.exr", channels, level=ZIP_LEVEL)
     return time.process_time() - start
 
 

@@ -35,7 +35,7 @@ from lightfield.stages.lenses import Reproject
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
 
 # The effort of zip. OpenEXR's default, 4, takes a third longer. Its files are 0 to 5 % smaller.
-_LEVEL = 1
+ZIP_LEVEL = 1
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ class ReprojectionJob:
     ) -> None:
         """Write (H, W) arrays as an EXR, with the compression of the settings."""
         compression = self.settings.compression or "zip"
-        write_exr(path, channels, attributes, compression, chromaticities, _LEVEL)
+        write_exr(path, channels, attributes, compression, chromaticities, ZIP_LEVEL)
 
     def outputs(self, view: SourceView, target: Target, light: Light) -> dict[str, Path]:
         """Return the files of a view's image, by kind."""
