@@ -170,5 +170,5 @@ locks:
 	echo uv | $(LOCK) --universal - -o envs/requirements-uv.txt
 	$(LOCK) --universal --python-version 3.11 envs/requirements-docs.in -o envs/requirements-docs.txt
 	$(LOCK) --universal --python-version 3.11 envs/requirements-consumers.in -o envs/requirements-consumers.txt
-	echo nerfstudio==1.1.5 | $(LOCK) --universal --no-deps --python-version 3.11 - -o envs/requirements-nerfstudio.txt
+	printf 'nerfstudio==1.1.5\nnerfbaselines\n' | $(LOCK) --universal --no-deps --python-version 3.11 - -o envs/requirements-nerfstudio.txt
 	echo 'moto[server]' | $(LOCK) --universal --python-version 3.11 - -o envs/requirements-s3-server.txt

@@ -443,7 +443,8 @@ def lock(_):
 
 def read_lock(_, dataset):
     scene_datasets("own")
-    blend_lock.expected_blend(dataset.scene_name, Path(dataset.source.blend), "0" * 64)
+    source = dataset.written.scene
+    blend_lock.expected_blend(dataset.scene_name, source, Path(source.blend), "0" * 64)
 
 
 def read_published(path, _):

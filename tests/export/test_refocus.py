@@ -12,7 +12,7 @@ from lightfield.core.files import read_json
 from lightfield.export import camera_grid
 from lightfield.export.refocus import disc_weights
 from lightfield.export.source import SourceDataset
-from lightfield.exporters import EXPORTERS
+from lightfield.exporters import EXPORTERS, focal_stack
 from lightfield.formats.lightfield import LightField
 from lightfield.geometry import lenses
 from lightfield.geometry.rotations import euler_to_matrix
@@ -188,6 +188,28 @@ def test_the_mean_is_of_linear_light(tmp_path):
     np.testing.assert_array_equal(images.read_image(as_exr / "focus_000.exr").colour[inner], 0.5)
     for folder, value in ((of_light, 188), (of_png, 188), (brighter, 255)):
         assert (images.read_image(folder / "focus_000.png").srgb[inner] == value).all()
+
+
+def test_a_pixel_that_is_no_number_spoils_no_picture(tmp_path, monkeypatch):
+    """It is left out. Nor does the picture depend on how many are made at a time."""
+    see = plane_at(1.7, waves)
+    write_views(tmp_path / "dataset", CAMERA, RIG, see=see)
+    options = {"distances": [1.7, 3.4, 2], "format": "exr"}
+    right = exported(tmp_path / "dataset", "focal_stack", tmp_path / "right", **options)
+    path = tmp_path / "dataset/exr/view_0007f.exr"
+    image = images.read_image(path)
+    red = image.channels["R"].copy()
+    red[20, 30:32] = [np.nan, np.inf]
+    images.write_exr(path, image.channels | {"R": red}, image.attributes)
+    monkeypatch.setattr(focal_stack, "_MOST_BYTES", 1)
+    spoilt = exported(tmp_path / "dataset", "focal_stack", tmp_path / "spoilt", **options)
+    for number in range(3):
+        name = f"focus_00{number}.exr"
+        expected, actual = (images.read_image(f / name).colour for f in (right, spoilt))
+        changed = np.abs(actual - expected).max(axis=-1) > 0
+        assert 0 < changed.sum() <= 5 * 6
+        if number == 0:
+            np.testing.assert_allclose(actual, expected, atol=0.01)
 
 
 def test_transparent_views_keep_their_alpha(tmp_path):

@@ -316,6 +316,18 @@ def test_an_ncore_camera_that_moves_is_exposed_for_half_a_frame_of_the_animation
             np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
+def test_a_view_with_a_name_of_ncore_s_own_is_refused(tmp_path):
+    write_sequence(tmp_path / "rig", LENSES["perspective"], numbers=[1, 2])
+    for path in (tmp_path / "rig").glob("*/lightfield.json"):
+        change_json(path, lambda content: content["frames"][1].update(name="points"))
+    folders = frame_folders(tmp_path / "rig")
+    source = SourceSequence.of_folders(tmp_path / "rig", folders, "", ".exr", {})
+    problem = r"f00001/lightfield.json: frames: NCore has a points itself; give the camera another"
+    with pytest.raises(UserError, match=problem):
+        exported(source, "ncore_frames", tmp_path)
+    assert not (tmp_path / "ncore_frames").exists()
+
+
 @pytest.mark.parametrize("name", ["miv_frames", "opendibr_frames"])
 def test_video_refuses_moving_cameras_and_frames_at_unequal_steps(sequences, tmp_path, name):
     moving = write_sequence(tmp_path / "moving", LENSES["perspective"], [1, 2], (0.1, 0, 0))

@@ -10,6 +10,7 @@ from scipy.special import sph_harm_y
 from sphere import RADIUS, write_views
 
 from lightfield.core.errors import UserError
+from lightfield.export import splat_drawing as splat
 from lightfield.export import splats
 from lightfield.export.source import SourceDataset
 from lightfield.export.trainer_splits import splits
@@ -17,7 +18,6 @@ from lightfield.formats import gaussians
 from lightfield.formats.gaussians import Gaussians
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import from_camera
-from lightfield.measurement import splat
 
 PINHOLE = {"lens": "rectilinear", "fov": 70, "resolution": [48, 40]}
 FISHEYE = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}

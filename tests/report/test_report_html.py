@@ -1005,6 +1005,9 @@ PLANE = {
 }
 
 
+FISHEYE_PLANE = PLANE | {"camera": {"lens": "equidistant", "fov": 120, "resolution": [96, 96]}}
+
+
 @pytest.fixture(scope="module")
 def focused(tmp_path_factory):
     """The page of a plane of cameras before a ball in a sphere, and the dataset's folder."""
@@ -1013,16 +1016,46 @@ def focused(tmp_path_factory):
     return folder, make_page(folder, PLANE, name="ball/LFPlane")
 
 
-def refocused(folder, distance):
-    """Return the mean light of the views of PLANE, moved to agree at a distance."""
+@pytest.fixture(scope="module")
+def focused_fisheye(tmp_path_factory):
+    """The same through a fisheye, whose depth is the distance."""
+    folder = tmp_path_factory.mktemp("results") / "ball" / "LFPlane"
+    write_dataset(folder, FISHEYE_PLANE, see=look_at_ball)
+    return folder, make_page(folder, FISHEYE_PLANE, name="ball/LFPlane")
+
+
+def seen_by_pinhole(directions):
+    """Return where views of PLANE see directions (..., 3): pixels' numbers down and across."""
+    right, up, back = np.moveaxis(directions, -1, 0)
     focal = 48 / math.tan(math.radians(30))
-    y, x = np.mgrid[:72, :96]
-    total, count = np.zeros((72, 96, 3)), np.zeros((72, 96, 1))
+    return 35.5 - focal * up / -back, 47.5 + focal * right / -back
+
+
+def seen_by_fisheye(directions):
+    """Return where views of FISHEYE_PLANE see directions. Its radius grows with the angle."""
+    right, up, back = np.moveaxis(directions, -1, 0)
+    aside = np.hypot(right, up)
+    radius = 48 * np.arctan2(aside, -back) / math.radians(60) / aside
+    return 47.5 - radius * up, 47.5 + radius * right
+
+
+def refocused(folder, distance, size, tangent, seen):
+    """Return the mean light of the views, in which a plane at a distance is sharp.
+
+    The picture has this ``size``, and the ``tangent`` of half its angle across. ``seen`` returns
+    where a view sees directions.
+    """
+    width, height = size
+    step = 2 * tangent / width
+    y, x = np.mgrid[:height, :width] + 0.5
+    plane = np.stack([step * (x - width / 2), step * (height / 2 - y), -np.ones_like(x)], -1)
+    total, count = np.zeros((height, width, 3)), np.zeros((height, width, 1))
     for view in LightField.read(folder / "lightfield.json").views:
         colour = images.read_image(folder / "exr" / f"{view.name}.exr").colour
         right, _, up = view.position - np.array(PLANE["center"])
-        at = y + focal * up / distance, x - focal * right / distance
-        inside = (at[0] >= 0) & (at[0] <= 71) & (at[1] >= 0) & (at[1] <= 95)
+        at = seen(distance * plane - [right, up, 0])
+        ends = colour.shape[0] - 1, colour.shape[1] - 1
+        inside = np.all([(a >= 0) & (a <= end) for a, end in zip(at, ends, strict=True)], axis=0)
         for channel in range(3):
             sampled = map_coordinates(colour[..., channel], at, order=1, mode="nearest")
             total[..., channel] += inside * sampled
@@ -1030,20 +1063,25 @@ def refocused(folder, distance):
     return total / count
 
 
-def test_the_page_of_a_plane_has_a_slider_of_the_focus(focused, show):
-    folder, html = focused
+@pytest.mark.parametrize(
+    ("page_of", "size", "tangent", "seen"),
+    [
+        ("focused", (96, 72), math.tan(math.radians(30)), seen_by_pinhole),
+        ("focused_fisheye", (96, 96), 1.0, seen_by_fisheye),
+    ],
+)
+def test_the_page_of_a_plane_has_a_slider_of_the_focus(page_of, size, tangent, seen, request, show):
+    folder, html = request.getfixturevalue(page_of)
     tab = show(html, width=1280)
     tab.locator("#focused[aria-busy=false]").wait_for()
     data = json.loads(tab.text_content("#data"))
     distances = data["focus"]["distances"]
-    depth = np.stack(
-        [
-            images.read_image(folder / "exr" / f"{view['name']}.exr").channels["Z"]
-            for view in data["views"]
-        ]
-    )
-    near, far = np.percentile(depth, [1, 99])
-    np.testing.assert_allclose(1 / np.array(distances), np.linspace(1 / near, 1 / far, 12), 1e-3)
+    assert data["focus"]["size"] == [*size]
+    # From the ball to the wall behind it, without the nearest and the farthest 1 %.
+    assert len(distances) == 12
+    assert 0.9 * (RADIUS + 0.5) < max(distances) < RADIUS + 0.5
+    assert BALL[1] - BALL_RADIUS + 0.5 < min(distances) < 1.1 * (BALL[1] - BALL_RADIUS + 0.5)
+    np.testing.assert_allclose(np.diff(1 / np.array(distances), 2), 0, atol=1e-3)
     light = light_of_codes(data)
     for number in (0, 6, 11):
         move(tab, "focus", number)
@@ -1052,11 +1090,11 @@ def test_the_page_of_a_plane_has_a_slider_of_the_focus(focused, show):
         assert float(written.removesuffix(" m")) == pytest.approx(distances[number], rel=0.01)
         codes = decoded(data["focus"]["pictures"][number])
         # Steps of light, the loss of the picture's file, and linear interpolation.
-        error = light[codes] - refocused(folder, distances[number])
-        assert np.abs(error).mean() < 0.01
+        expected = refocused(folder, distances[number], size, tangent, seen)
+        assert np.abs(light[codes] - expected)[2:-2, 2:-2].mean() < 0.01
         shown = pixels(tab, "focused")[..., :3]
-        expected = pictures.develop(np.float32(light[codes]), data["exposure"])
-        assert np.abs(shown - expected.astype(int)).max() <= 1
+        developed = pictures.develop(np.float32(light[codes]), data["exposure"])
+        assert np.abs(shown - developed.astype(int)).max() <= 1
     # The exposure chosen above applies here, too.
     before = pixels(tab, "focused")[..., :3].mean()
     move(tab, "exposure", 1)

@@ -53,10 +53,11 @@ class MovableView:
     """A view that can be added to a sum after it was moved by parts of pixels.
 
     ``light`` (height, width, 4) is linear, with alpha, by which it is multiplied. It counts where
-    it is ``valid`` (height, width).
+    it is finite and ``valid`` (height, width).
     """
 
     def __init__(self, light: Array, valid: Bools) -> None:
+        valid = valid & np.isfinite(light).all(axis=-1)
         self._light = np.ascontiguousarray(np.where(valid[..., np.newaxis], light, 0), np.float32)
         self._valid = np.ascontiguousarray(valid)
         # Where 4 × 4 pixels count, of which this is the first.

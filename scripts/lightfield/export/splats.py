@@ -104,13 +104,18 @@ class _Samples:
 def make(source: SourceDataset, count: int) -> Gaussians:
     """Return at most ``count`` Gaussians of all surfaces and the sky, from the views that train."""
     views = splits(source.lightfield).train
-    pixels = len(views) * source.lens.width * source.lens.height
-    step = max(1.0, math.sqrt(pixels / (_PIXELS * count)))
+    step = pixel_step(source, views, count)
     while True:
         gaussians = _owned(source, views, _Grid(source.lens, step))
         if len(gaussians) <= count:
             return gaussians
         step *= 1.02 * math.sqrt(len(gaussians) / count)
+
+
+def pixel_step(source: SourceDataset, views: Sequence[View], count: int) -> float:
+    """Return the step in pixels, at least 1, with which ``count`` Gaussians read ``views``."""
+    pixels = len(views) * source.lens.width * source.lens.height
+    return max(1.0, math.sqrt(pixels / (_PIXELS * count)))
 
 
 def _owned(source: SourceDataset, views: Sequence[View], grid: _Grid) -> Gaussians:

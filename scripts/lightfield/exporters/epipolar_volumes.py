@@ -161,7 +161,8 @@ def _write_array(
     """Write an array of NumPy page by page, so that it need not fit in memory."""
     kind = np.dtype(dtype).newbyteorder("<")
     header = {"descr": kind.str, "fortran_order": False, "shape": shape}
+    npy: Any = np.lib.format  # without types in older versions of NumPy
     with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.lib.format.write_array_header_1_0(file, header)
+        npy.write_array_header_1_0(file, header)
         for page in pages:
             file.write(np.ascontiguousarray(page, kind).tobytes())

@@ -8,6 +8,8 @@
 `lightfield.export.refocus` says how views become such a picture.
 """
 
+import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, Self
 
@@ -37,6 +39,9 @@ from lightfield.imaging.alpha import divisor
 
 _PICTURES = 12
 """How many distances there are if the settings name none."""
+
+_MOST_BYTES = 400_000_000
+"""How much memory the sums of pictures take together, if there are several."""
 
 
 class FocalStack(Developed):
@@ -134,31 +139,37 @@ class FocalStack(Developed):
 
 def _refocused(
     source: SourceDataset, grid: CameraGrid, weights: Floats, distances: list[float]
-) -> NDArray[np.float32]:
-    """Return linear light with alpha (distances, height, width, 4). Reads each view once."""
+) -> Iterator[NDArray[np.float32]]:
+    """Yield linear light with alpha (height, width, 4) for each distance.
+
+    Reads the views once for as many distances as fit in `_MOST_BYTES`.
+    """
     from lightfield.export.refocus import MovableView, disparities, mean_light
 
     lens = source.lens
     assert isinstance(lens, Rectilinear)
-    totals = np.zeros((len(distances), lens.height, lens.width, 5), np.float32)
-    focal = cameras.focal_pixels(lens)
-    moves = [disparities(grid, focal, distance) for distance in distances]
+    shape = (lens.height, lens.width, 5)
+    together = max(1, _MOST_BYTES // (4 * math.prod(shape)))
+    batches = [distances[first:][:together] for first in range(0, len(distances), together)]
     places = np.argwhere(weights > 0).tolist()
-    progress = Progress(len(places), "focal_stack", "views")
-    for row, column in places:
-        view = source.lightfield.views[grid.views[0, row, column]]
-        movable = MovableView(source.light(view), source.valid(view))
-        for total, move in zip(totals, moves, strict=True):
-            right, down = move[row, column].tolist()
-            movable.add_to(total, right, down, float(weights[row, column]))
-        progress.done()
-    for distance, total in zip(distances, totals, strict=True):
-        if not total[..., 4].any():
-            raise UserError(
-                f"{source.lightfield.path}: distances: {distance:g} m is so near that the views "
-                "show nothing of the middle's picture"
-            )
-    return np.stack([mean_light(total) for total in totals])
+    progress = Progress(len(places) * len(batches), "focal_stack", "views")
+    for batch in batches:
+        totals = [np.zeros(shape, np.float32) for _ in batch]
+        moves = [disparities(grid, cameras.focal_pixels(lens), distance) for distance in batch]
+        for row, column in places:
+            view = source.lightfield.views[grid.views[0, row, column]]
+            movable = MovableView(source.light(view), source.valid(view))
+            for total, move in zip(totals, moves, strict=True):
+                right, down = move[row, column].tolist()
+                movable.add_to(total, right, down, float(weights[row, column]))
+            progress.done()
+        for distance, total in zip(batch, totals, strict=True):
+            if not total[..., 4].any():
+                raise UserError(
+                    f"{source.lightfield.path}: distances: {distance:g} m is so near that the "
+                    "views show nothing of the middle's picture"
+                )
+            yield mean_light(total)
 
 
 def _write(source: SourceDataset, light: NDArray[np.float32], path: Path) -> None:

@@ -35,7 +35,11 @@ _COLOUR_BITS = 10
 _DEPTH_BITS = 16
 # Frames a second of a sequence of one frame, which takes no time.
 _RATE = 30
-LOADER = "Encoder -c {}/sequence.json  # TMIV, with a configuration of its own"
+# TMIV's encoder finds the sequence by the name of its folder.
+LOADER = (
+    "Encoder -c CONFIGURATION -p inputDirectory {{}}/.. -p inputSequenceConfigPathFmt "
+    "{{1}}/sequence.json -s {name} -n {frames}  # TMIV, with a configuration of its own"
+)
 
 # Columns: forward, left and up of OMAF's camera in our camera's axes (looks along −z, y up).
 _FROM_OMAF = np.array([[0.0, -1, 0], [0, 0, 1], [-1, 0, 0]])
@@ -85,7 +89,7 @@ class Miv(MivSequence):
     name = "miv"
     summary = "Sequence for TMIV, the test model of MPEG immersive video."
     rank = 6
-    loader = LOADER
+    loader = LOADER.format(name="miv", frames=1)
 
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write a source's views into ``folder``."""

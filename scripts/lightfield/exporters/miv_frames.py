@@ -14,7 +14,7 @@ class MivFrames(MivSequence):
     name = "miv_frames"
     summary = "Sequence of all frames for TMIV, the test model of MPEG immersive video."
     rank = 17
-    loader = LOADER
+    loader = LOADER.format(name="miv_frames", frames="FRAMES")
     is_of_sequence = True
 
     rate: AnimationRate = 30

@@ -4,6 +4,7 @@ Its world is the dataset's: metres, with Z up.
 """
 
 from pathlib import Path
+from typing import Literal
 
 from pydantic import Field
 
@@ -24,10 +25,23 @@ class Splat(ForTraining):
     loader = "# Open {}/splat.ply in SuperSplat, Brush or another viewer of splats."
 
     gaussians: PointCount = Field(1_000_000, description="The largest number of Gaussians.")
+    # Settings and export.json have it only if it is used, so that earlier exports keep their bytes.
+    fit: Literal["colours"] | None = Field(
+        None,
+        exclude_if=lambda fit: fit is None,
+        description="What to fit to the views that train: `colours` fits colours and opacities, "
+        "and keeps places and sizes.",
+    )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         return None if has_depth else NO_DEPTH
 
     def export(self, source: SourceDataset, folder: Path) -> None:
         """Write ``splat.ply`` into ``folder``."""
-        gaussians.write(folder / "splat.ply", splats.make(source, self.gaussians))
+        made = splats.make(source, self.gaussians)
+        if self.fit == "colours":
+            # Only here, because its kernels take long to load.
+            from lightfield.export.splat_fitting import fitted
+
+            made = fitted(made, source)
+        gaussians.write(folder / "splat.ply", made)

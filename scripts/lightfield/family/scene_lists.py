@@ -23,7 +23,7 @@ _NAMES = {"train": "train", "validation": "val", "test": "test"}
 
 
 def write(job: ListScenes) -> None:
-    """Write the lists of each part that has such exports, and say how many scenes they have.
+    """Write the lists of each part that has such exports, and say how many exports they have.
 
     Raises `UserError` if no member has such an export.
     """
@@ -36,7 +36,7 @@ def write(job: ListScenes) -> None:
             "exports: wai, or exports: dust3r"
         )
     parts = zip(PARTS, numbers, strict=True)
-    print(", ".join(f"{part}: {count(number, 'scene')}" for part, number in parts))
+    print(", ".join(f"{part}: {count(number, 'export')}" for part, number in parts))
 
 
 def _write_part(output: Path, corpus: Path, content: dict[str, Any], part: str) -> int:

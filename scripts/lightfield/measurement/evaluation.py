@@ -18,6 +18,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from lightfield.core.errors import UserError
 from lightfield.core.files import absolute_path
 from lightfield.export.source import Bools, Floats, SourceDataset
+from lightfield.export.splat_drawing import draw
 from lightfield.formats.depth import check_size
 from lightfield.formats.gaussians import Gaussians
 from lightfield.formats.lightfield import View
@@ -39,7 +40,6 @@ from lightfield.measurement.picture_difference import (
     ssim_map,
     ws_psnr,
 )
-from lightfield.measurement.splat import draw
 
 # The width of an edge in pixels.
 _EDGE_PIXELS = 5

@@ -154,7 +154,8 @@ def read(path: Path) -> Lpips:
 
 def _windows(values: Floats, width: int, stride: int) -> Floats:
     """Return windows of values (channels, h, w): (channels, rows, columns, width, width)."""
-    return sliding_window_view(values, (width, width), axis=(1, 2))[:, ::stride, ::stride]
+    rows = sliding_window_view(values, width, axis=1)[:, ::stride]
+    return np.asarray(sliding_window_view(rows, width, axis=2)[:, :, ::stride])
 
 
 def _convolved(values: Floats, weight: Floats, bias: Floats, padding: int, stride: int) -> Floats:

@@ -278,7 +278,7 @@ def _refocused(
     shown: dict[str, Any],
 ) -> dict[str, Any] | None:
     """Return the pictures of the slider of the focus. None if the rig is no plane with depth."""
-    grid = focus.plane_of(rig, lightfield.lens, lightfield.world_from_cameras)
+    grid = focus.plane_of(rig, lightfield.world_from_cameras)
     if grid is None or depths is None:
         return None
     readable = [

@@ -271,7 +271,7 @@ def _developed(
             pixels[rows] = encode(colour)
         if "exr" in outputs:
             stored = colour * alpha if transparent else colour
-            half[:, rows] = narrow(from_rec_709(stored, settings.primaries or "rec709"), 3)
+            narrow(from_rec_709(stored, settings.primaries or "rec709"), half[:, rows])
     if empty.any():
         covered[empty] = 0
         half[:, empty] = 0
