@@ -134,6 +134,11 @@ soak: .venv/complete
 		> $(@D)/lib/python$(VERSION)/site-packages/others.pth
 	@touch $@
 
+# For Slurm.
+.venv/complete-with-slurm: .venv/complete envs/requirements-slurm-3.13.txt envs/requirements-slurm-3.11.txt
+	@$(PIP) install --require-hashes -r envs/requirements-slurm-$(VERSION).txt
+	@touch $@
+
 # For machines without a common folder.
 .venv/complete-with-storage: .venv/complete envs/requirements-storage-3.13.txt envs/requirements-storage-3.11.txt
 	@$(PIP) install --require-hashes -r envs/requirements-storage-$(VERSION).txt
@@ -157,7 +162,7 @@ soak: .venv/complete
 locks:
 	for version in 3.13 3.11; do \
 		$(LOCK) --python-version $$version envs/requirements-test.in -o envs/requirements-test-$$version.txt && \
-		for lock in requirements requirements-storage; do \
+		for lock in requirements requirements-slurm requirements-storage; do \
 			$(LOCK) --python-version $$version envs/$$lock.in \
 				--constraints envs/requirements-test-$$version.txt -o envs/$$lock-$$version.txt || exit; \
 		done; \
@@ -165,5 +170,5 @@ locks:
 	echo uv | $(LOCK) --universal - -o envs/requirements-uv.txt
 	$(LOCK) --universal --python-version 3.11 envs/requirements-docs.in -o envs/requirements-docs.txt
 	$(LOCK) --universal --python-version 3.11 envs/requirements-consumers.in -o envs/requirements-consumers.txt
-	echo nerfstudio==1.1.5 | $(LOCK) --universal --no-deps --python-version 3.11 - -o envs/requirements-nerfstudio.txt
+	printf 'nerfstudio==1.1.5\nnerfbaselines\n' | $(LOCK) --universal --no-deps --python-version 3.11 - -o envs/requirements-nerfstudio.txt
 	echo 'moto[server]' | $(LOCK) --universal --python-version 3.11 - -o envs/requirements-s3-server.txt

@@ -262,7 +262,8 @@ def read_and_write(source: Path, target: Path, lens: Lens) -> None:
     wide = widen(*(read[name] for name in "RGB"))
     rows = np.arange(lens.height) % len(wide)
     columns = np.arange(lens.width) % wide.shape[1]
-    half = narrow(np.ascontiguousarray(wide[rows][:, columns]), 3)
+    half = np.empty((3, lens.height, lens.width), np.float16)
+    narrow(np.ascontiguousarray(wide[rows][:, columns]), half)
     images.write_exr(target, dict(zip("RGB", half, strict=True)))
 
 

@@ -253,7 +253,7 @@ PROGRAM_GROUPS = {
         "new_scene", "build_scene", "import_model", "fetch_blend", "check_blend", "inventory",
         "make_lightfield", "free_places", "check_cameras", "corners", "import_views",
     ],
-    "Build a family": ["build_members", "corpus", "count_members", "prune"],
+    "Build a family": ["build_members", "corpus", "count_members", "list_scenes", "prune"],
     "Render": ["check_device", "probe", "calibrate", "render_shard"],
     "Reproject": ["lens_map", "reproject"],
     "Export": [

@@ -47,6 +47,9 @@ rule render_panorama:
         RUN.log_of(RENDER_PANORAMA),
     benchmark:
         RUN.times_of(RENDER_PANORAMA)
+    # Before the views. Otherwise it renders last, while other cores have nothing to do.
+    priority: 1
+    threads: REQUESTS.threads_of_panorama
     resources:
         **RUN.gpu,
         mem_mb=REQUESTS.memory_of(RENDER_PANORAMA),

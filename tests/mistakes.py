@@ -308,9 +308,12 @@ REFUSED = [
             {"sources": ["perspective"]},
             f"exports.{name}.sources: perspective: the rig LFSphere has fewer than two frames",
         )
-        for name in ("dnerf", "colmap_frames", "multipleview")
+        for name in ("dnerf", "colmap_frames", "multipleview", "ncore_frames")
     ),
-    ("exports.neural_3d_video", {"sources": ["perspective"], "rate": 0}),
+    *(
+        (f"exports.{name}", {"sources": ["perspective"], "rate": 0})
+        for name in ("neural_3d_video", "miv_frames", "opendibr_frames", "ncore_frames")
+    ),
     ("exports.scene_flow", {"sources": ["perspective"]}, "exports.scene_flow.sources: perspective"),
     ("exports.coco", {"sources": ["views"]}, "exports.coco.sources: views lacks the pass object"),
     *(("mesh", value) for value in (None, True, "glb", [])),
@@ -544,6 +547,7 @@ REFUSED = [
     *(("render.camera_motion", {"turn": value}) for value in ([0, 180, 0], [0, 1], 5)),
     *(("render.camera_motion", {"travel": [1, 0, 0], "rolling": value}) for value in (0, 1.5)),
     *(("reprojections.perspective.primaries", value) for value in ("acescg", "ACEScg", 7)),
+    *(("reprojections.perspective.compression", value) for value in ("zip", "ZIP", "dwaa", 1)),
     *(("reprojections.perspective.look", value) for value in ("agx", None, 7, "Raw - Punchy")),
     *(("sensor", value) for value in ("noise", None, [], {"gain": 1})),
     *(("sensor.sources", value) for value in ([], "views", ["view"], ["views", "views"])),
@@ -587,6 +591,18 @@ REFUSED = [
             ("instant_ngp", "render_aabb", [[0, 0, 0]]),
             ("instant_ngp", "render_aabb", [[1, 1, 1], [0, 0, 0]]),
             ("wai", "exposure", 101),
+            ("dust3r", "overlap", 1.1),
+            ("focal_stack", "distances", []),
+            ("focal_stack", "distances", [0]),
+            ("focal_stack", "distances", 2),
+            ("focal_stack", "aperture", -1),
+            ("focal_stack", "format", "jpg"),
+            ("quilt", "focus", 0),
+            ("quilt", "row", -1),
+            ("quilt", "tiles", [8]),
+            ("quilt", "tiles", [0, 6]),
+            ("quilt", "aspect", 0),
+            ("epipolar_volumes", "depth", 1),
             ("opendibr", "format", "mp4"),
             ("ncore", "points", 0),
             ("lichtfeld", "format", "jpg"),
@@ -993,6 +1009,11 @@ EXPLAINED = [
         "reprojections.perspective.primaries",
         "rec709",
         "reprojections.perspective.primaries: is only for format exr; a PNG is sRGB",
+    ),
+    (
+        "reprojections.perspective.compression",
+        "htj2k",
+        "reprojections.perspective.compression: is only for EXR files: format exr, or passes",
     ),
     (
         "reprojections.perspective.look",

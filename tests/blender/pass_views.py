@@ -3,9 +3,9 @@
 Runs in a process of its own, because bpy keeps one global state. The argument is a folder. For each
 lens it writes there a dataset <lens>/, and its receipt receipts/<lens>.jsonl. In
 objects.npz, <lens> holds the name of the object that Blender's own ray casts hit behind each pixel
-of the first view. "plain" is the perspective without passes, "denoised" the same with some
-passes, "transparent" the fisheye. matte.exr is the wall's matte, which Blender's compositor reads
-from the perspective's Cryptomatte.
+of the first view. "plain" is the perspective without passes, "without_variance" with all other
+passes, "denoised" with some passes. "transparent" is the fisheye. matte.exr is the wall's matte,
+which Blender's compositor reads from the perspective's Cryptomatte.
 """
 
 import json
@@ -18,7 +18,7 @@ import one_shard
 from mathutils import Vector
 
 from lightfield.formats.lightfield import OMNIDIRECTIONAL, LightField
-from lightfield.formats.passes import PASSES
+from lightfield.formats.passes import PASSES, VARIANCE
 from lightfield.geometry import lenses
 from lightfield.rendering.scenes import blend_file
 
@@ -31,7 +31,7 @@ LENSES = {
     "panorama": {"lens": "equirectangular", "resolution": [2 * SIZE, SIZE]},
 }
 RENDER = {
-    "samples": 4,
+    "samples": 8,
     "adaptive_threshold": 0,
     "denoise": False,
     "seed": 0,
@@ -245,6 +245,9 @@ def main(folder: Path) -> None:
     bare = lightfield("perspective")
     settings = {key: value for key, value in RENDER.items() if key != "passes"}
     render("plain", bare.changed(render=settings), "0:1")
+    # The variance changes last digits of the colour.
+    names = [name for name in PASSES if name != VARIANCE]
+    render("without_variance", lightfield("perspective", passes=names), "0:1")
     # Rendering again must replace a missing file of a view, and a missing list of names.
     files = ["normal/view_0001f.exr", "object/names.json"]
     first_bytes = {file: (folder / "perspective" / file).read_bytes() for file in files}

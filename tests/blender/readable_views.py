@@ -17,7 +17,7 @@ import one_shard
 
 from lightfield.configuration import keys
 from lightfield.formats.lightfield import LightField
-from lightfield.formats.passes import PASSES
+from lightfield.formats.passes import PASSES, VARIANCE
 from lightfield.geometry import lenses
 from lightfield.rendering.scenes import blend_file
 
@@ -41,7 +41,8 @@ CHOICES = {
     **{name: {"passes": [name]} for name in ALONE},
     "light": {"passes": [name for name, each in PASSES.items() if each.kind == "light"]},
     "surfaces": {"passes": [name for name, each in PASSES.items() if each.unless]},
-    "all": {"passes": list(PASSES)},
+    # The variance changes last digits of the colour.
+    "all": {"passes": [name for name in PASSES if name != VARIANCE]},
     "groups": {
         "light_groups": {"lamp": ["lamp"], "tile": ["group 300"], "others": ["World"]},
     },

@@ -248,6 +248,7 @@ def test_another_choice_of_points_runs_again_only_exports_with_a_number_of_point
     rig = {"type": "plane", "cameras": [2, 2], "camera": camera}
     rig |= {"frames": {"first": 1, "last": 2}}
     with_number = {"colmap", "nerfstudio", "ncore", "lichtfeld", "dnerf", "colmap_frames"}
+    with_number |= {"ncore_frames"}
     names = [*with_number, "splat", "nerf_synthetic", "point_cloud", "poses_csv"]
     content = {"scene": {"builder": "room"}, "render": {"samples": 1}, "rigs": {"flat": rig}}
     content["exports"] = {name: {"sources": ["views"]} for name in names}

@@ -443,7 +443,8 @@ def lock(_):
 
 def read_lock(_, dataset):
     scene_datasets("own")
-    blend_lock.expected_blend(dataset.scene_name, Path(dataset.source.blend), "0" * 64)
+    source = dataset.written.scene
+    blend_lock.expected_blend(dataset.scene_name, source, Path(source.blend), "0" * 64)
 
 
 def read_published(path, _):
@@ -666,6 +667,8 @@ EXPORTS = {
     "poses_csv": {},
     "point_cloud": {"voxel": 0.1},
     "wai": {},
+    "focal_stack": {},
+    "epipolar_volumes": {"depth": True},
 }
 PICTURES = {".png", ".exr", ".yuv", ".mp4"}
 

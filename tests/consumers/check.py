@@ -4,7 +4,7 @@ The consumers are nerfstudio, NCore and OpenCV. `make consumers` runs this in an
 own, after export.py. The tests read COLMAP's models with pycolmap. Prints the largest error of each
 export. An error beyond its limit ends in an AssertionError. published.py reads what is published,
 sequences.py the exports with a time, lichtfeld.py those for a program that has no Python package,
-and learning.py those from which a field learns.
+each.py every export of the same views, and learning.py those from which a field learns.
 """
 
 import json
@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import cv2
+import each
 import learning
 import lichtfeld
 import numpy as np
@@ -247,6 +248,7 @@ def main():
     sequences.check(folder / "sequence")
     for name in ("fisheye", "opencv"):
         opencv(folder, name)
+    each.check(folder / "each")
     learning.check(nerfstudio_parser(folder / "learn" / "export"))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "scripts"), str(ROOT / "tests")]
 
+import views_of_all  # noqa: E402
 from sphere import LENSES, enlarged, look, look_at_ball, write_views  # noqa: E402
 
 from lightfield.configuration.publication import Credits  # noqa: E402
@@ -58,6 +59,7 @@ FRAMES = {1: look, 2: look_at_ball, 5: look_at_ball}
 SEQUENCE = {
     "dnerf": {"points": 20000},
     "neural_3d_video": {"points": 20000},
+    "ncore_frames": {"points": 20000, "rate": 24},
 }
 
 
@@ -141,6 +143,7 @@ def main() -> None:
         export_moving(folder / "moving" / name, motion)
     write_sequence(folder / "sequence")
     publish_views(folder / "publish")
+    views_of_all.write(folder / "each")
     write_views(folder / "learn" / "dataset", LENSES["perspective"], LEARNED_RIG)
     source = SourceDataset(folder / "learn" / "dataset", "", ".exr")
     settings = EXPORTERS["nerfstudio"].model_validate({"sources": ["views"], "depth": True})

@@ -1,4 +1,4 @@
-"""Reads the exports of a sequence: D-NeRF with nerfstudio, and videos with OpenCV."""
+"""Reads the exports of a sequence: D-NeRF with nerfstudio, videos with OpenCV, NCore by itself."""
 
 import json
 
@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 RADIUS = 3.0
+BALL, BALL_RADIUS = np.array([0, 1.8, 0]), 0.5
 
 
 def shows(picture, frame, rotation, position, focal):
@@ -33,7 +34,9 @@ def shows(picture, frame, rotation, position, focal):
 
 
 def check(folder):
-    times = sorted(int(path.name[1:]) for path in folder.glob("f[0-9]*"))
+    frames = sorted(folder.glob("f[0-9]*"))
+    times = sorted(int(path.name[1:]) for path in frames)
+    ncore(folder / "exports/ncore_frames", frames, times)
     times = [(time - times[0]) / (times[-1] - times[0]) for time in times]
     dnerf(folder / "exports/dnerf", times)
     if (folder / "exports/neural_3d_video").exists():
@@ -85,3 +88,65 @@ def neural_3d_video(folder, count):
         f"within {levels:.1f} levels"
     )
     assert levels < 16
+
+
+def ncore(folder, frames, numbers):
+    """Check times, poses, rays and points of each frame, which NCore's loader gives."""
+    import torch
+    from ncore.data.v4 import SequenceComponentGroupsReader, SequenceLoaderV4
+    from ncore.sensors import CameraModel
+
+    rate = json.loads((folder / "export.json").read_text())["options"]["rate"]
+    seconds = (np.array(numbers) - numbers[0]) / rate
+    loader = SequenceLoaderV4(SequenceComponentGroupsReader([folder / "views.json"]))
+    (lidar,) = map(loader.get_lidar_sensor, loader.lidar_ids)
+    metres = moved = radians = levels = 0.0
+    for index, _ in enumerate(frames):
+        cloud = lidar.get_frame_point_cloud(index, motion_compensation=True, with_start_points=True)
+        points = cloud.xyz_m_end.astype(float)
+        to_sphere = np.abs(np.linalg.norm(points, axis=1) - RADIUS)
+        to_ball = np.abs(np.linalg.norm(points - BALL, axis=1) - BALL_RADIUS)
+        # The first frame has no ball.
+        metres = max(metres, (np.minimum(to_sphere, to_ball) if index else to_sphere).max())
+        assert (to_ball < 1e-4).any() == (index > 0)
+    times = lidar.frames_timestamps_us[:, 1] / 1e6
+    assert np.abs(times - seconds).max() < 1e-6
+    for name in loader.camera_ids:
+        camera = loader.get_camera_sensor(name)
+        assert np.abs(camera.frames_timestamps_us[:, 1] / 1e6 - seconds).max() < 1e-6
+        model = CameraModel.from_parameters(
+            camera.model_parameters, device="cpu", dtype=torch.float32
+        )
+        width, height = model.resolution.tolist()
+        for index, frame in enumerate(frames):
+            assert camera.get_frame_generic_meta_data(index)["name"] == name
+            matrix, lens = view_of(frame, name)
+            pose = camera.get_frames_T_source_target(name, "world", np.array(index))
+            pose = pose.reshape(4, 4).astype(float)
+            moved = max(moved, np.abs(pose @ np.diag([1, -1, -1, 1]) - matrix).max())
+            focal = lens["focal_length"] * width / lens["sensor_size"][0]
+            picture = camera.get_frame_image_array(index).astype(float)
+            error = shows(picture, index, matrix[:3, :3], matrix[:3, 3], focal)
+            levels = max(levels, error)
+            columns, rows = (axis.ravel() for axis in np.meshgrid(range(width), range(height)))
+            rays = model.pixels_to_camera_rays(np.column_stack([columns, rows])).numpy()
+            expected = [(columns + 0.5 - width / 2) / focal, (rows + 0.5 - height / 2) / focal]
+            expected = np.column_stack([*expected, np.ones(len(rows))])
+            expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+            radians = max(radians, np.linalg.norm(rays - expected, axis=1).max())
+    print(
+        f"NCore, ncore_frames: {len(loader.camera_ids)} cameras of {len(frames)} frames at "
+        f"{np.round(seconds, 3).tolist()} s; poses within {moved:.2g}, rays within {radians:.2g} "
+        f"rad, points within {1000 * metres:.2g} mm, colours within {levels:.1f} levels"
+    )
+    assert moved < 1e-6
+    assert radians < 1e-5
+    assert metres < 1e-4
+    assert levels < 3
+
+
+def view_of(frame, name):
+    """Return the camera-to-world matrix (4, 4) of a view at a frame, and its camera's settings."""
+    content = json.loads((frame / "lightfield.json").read_text())
+    (matrix,) = [view["world_matrix"] for view in content["frames"] if view["name"] == name]
+    return np.array(matrix), content["camera"] | {"sensor_size": content["sensor_size"]}

@@ -45,6 +45,7 @@ LIGHT = [
     "flow",
     "gpu_check",
     "import_views",
+    "list_scenes",
     "plan",
     "probe",
     "prune",

@@ -442,6 +442,21 @@ def test_opendibr_lifts_its_disparity_to_the_scene(dataset, tmp_path, source):
         np.testing.assert_allclose(rgb[seen], expected[seen], atol=1)
 
 
+def omaf_points(camera, depth):
+    """Return the world points of all pixels, as TMIV unprojects them in OMAF's axes."""
+    width, height = camera["Resolution"]
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    if camera["Projection"] == "Perspective":
+        (fx, fy), (cx, cy) = camera["Focal"], camera["Principle_point"]
+        x, y, z = np.ones_like(u), (cx - u * width) / fx, (cy - v * height) / fy
+    else:
+        across, down = np.radians(camera["Hor_range"]), np.radians(camera["Ver_range"])
+        phi, theta = across[1] - np.ptp(across) * u, down[1] - np.ptp(down) * v
+        x, y, z = np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)
+    turn = Rotation.from_euler("ZYX", camera["Rotation"], degrees=True).as_matrix()
+    return np.stack([x, y, z], axis=-1) @ turn.T * depth[..., None] + camera["Position"]
+
+
 @pytest.mark.parametrize("source", ["perspective", "shifted", "panorama", "half", "left"])
 def test_miv_lifts_its_disparity_to_the_scene(dataset, tmp_path, source):
     folder = exported(dataset, "miv", source, tmp_path)
@@ -449,22 +464,12 @@ def test_miv_lifts_its_disparity_to_the_scene(dataset, tmp_path, source):
     assert content["sourceCameraNames"] == [camera["Name"] for camera in content["cameras"]]
     for camera in content["cameras"]:
         width, height = camera["Resolution"]
-        u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-        if camera["Projection"] == "Perspective":
-            (fx, fy), (cx, cy) = camera["Focal"], camera["Principle_point"]
-            x, y, z = np.ones_like(u), (cx - u * width) / fx, (cy - v * height) / fy
-        else:
-            across, down = np.radians(camera["Hor_range"]), np.radians(camera["Ver_range"])
-            phi, theta = across[1] - np.ptp(across) * u, down[1] - np.ptp(down) * v
-            x, y, z = np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)
-        turn = Rotation.from_euler("ZYX", camera["Rotation"], degrees=True).as_matrix()
         size = f"{width}x{height}"
         frame = np.fromfile(folder / f"{camera['Name']}_depth_{size}_yuv420p16le.yuv", "<u2")
         assert frame.size == width * height * 3 // 2
         levels = frame[: width * height].reshape(height, width)
         assert (levels > 0).all()
-        rays = np.stack([x, y, z], axis=-1) @ turn.T
-        points = rays * of_disparity(levels, camera, 16)[..., None] + camera["Position"]
+        points = omaf_points(camera, of_disparity(levels, camera, 16))
         on_sphere(points, 1e-3)
         frame = np.fromfile(folder / f"{camera['Name']}_texture_{size}_yuv420p10le.yuv", "<u2")
         luma = frame[: width * height].reshape(height, width)

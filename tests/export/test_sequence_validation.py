@@ -26,7 +26,7 @@ from lightfield.validation.sequence import (
 from lightfield.validation.verification import faults
 
 sequence = test_sequence_exports.sequence
-KINDS = ("dnerf", "neural_3d_video", "colmap_frames", "multipleview")
+KINDS = ("dnerf", "neural_3d_video", "colmap_frames", "multipleview", "ncore_frames")
 POINTS = {"points": 200}
 
 

@@ -281,7 +281,7 @@ def test_geometry_is_the_same_beside_a_denoised_colour(view, made):
 def test_colour_and_depth_are_the_same_without_passes(made):
     plain, with_passes = (
         images.read_image(made / name / "exr" / "view_0000f.exr").channels
-        for name in ("perspective", "plain")
+        for name in ("without_variance", "plain")
     )
     for channel in "RGBZ":
         np.testing.assert_array_equal(plain[channel], with_passes[channel])

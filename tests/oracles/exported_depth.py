@@ -60,6 +60,16 @@ def faults(dataset: Path, sets: Sequence[ImageSet], exports: Sequence[SetExport]
     return problems
 
 
+def range_faults(depth_range: DepthRange, frames: Sequence[tuple[Path, ImageSet]]) -> Iterator[str]:
+    """Compare the range of a view with its depth in all frames: folders, and the views there."""
+    views = [
+        _read(folder, image_set, view)
+        for folder, image_set in frames
+        for view in _views_of(depth_range, image_set)
+    ]
+    yield from _range_faults(depth_range, views)
+
+
 def converted(depth: NDArray[Any], camera: Camera, meaning: str) -> NDArray[Any]:
     """Return a view's depth (height, width) as "z" or "distance". NaN where it has no value."""
     if meaning == camera.depth:

@@ -263,7 +263,9 @@ def _read(picture: Picture, channel: str) -> NDArray[Any]:
     width, height = picture.size
     count = width * height
     if path.suffix == ".yuv":
-        return _array(path, content[: 2 * count], "<u2", (height, width))
+        # The luma of a frame of 4:2:0 is two thirds of it.
+        start = picture.frame * 3 * count
+        return _array(path, content[start : start + 2 * count], "<u2", (height, width))
     # COLMAP's depth maps, and portable float maps, whose lowest row is first.
     pixels = _array(path, content[len(content) - 4 * count :], "<f4", (height, width))
     return np.flipud(pixels) if path.suffix == ".pfm" else pixels

@@ -15,7 +15,7 @@ from lightfield.imaging import images
 from lightfield.validation.cameras import camera_of
 from lightfield.validation.files import read_sets
 from lightfield.validation.sequence import export_lists
-from oracles import exported_cameras, exported_depth
+from oracles import exported_cameras, exported_depth, exported_pictures
 from oracles.exported_cameras import Expected, SetExport
 from oracles.exported_depth import converted
 from oracles.readers import read_sequence
@@ -64,6 +64,9 @@ def faults(rig: Path) -> list[str]:
         except UserError as error:
             problems.append(str(error))
             continue
+        sources = [(frame.folder, frame.views) for frame in frames]
+        for depth_range in exported[0].ranges:
+            problems += exported_depth.range_faults(depth_range, sources)
         for frame, content in zip(frames, exported, strict=True):
             problems += _camera_faults(name, frame, content)
             problems += _depth_faults(frame, content)
@@ -115,9 +118,11 @@ def _training(expected: Expected) -> list[View]:
 
 
 def _depth_faults(frame: Frame, exported: Exported) -> Iterator[str]:
-    """Yield the points and the flow that do not agree with the depth of a frame's views."""
-    of_frame = SetExport(len(frame.sets) - 1, exported, False)
-    yield from exported_depth.faults(frame.folder, frame.sets, [of_frame])
+    """Yield the points, pictures and flow that do not agree with a frame's views."""
+    # Ranges are of all frames.
+    of_frame = [SetExport(len(frame.sets) - 1, replace(exported, ranges=[]), False)]
+    yield from exported_depth.faults(frame.folder, frame.sets, of_frame)
+    yield from exported_pictures.faults(frame.folder, frame.sets, of_frame)
     if exported.flows is not None:
         names = [flow.view for flow in exported.flows]
         for view in sorted({*names} ^ {*frame.views.views}):

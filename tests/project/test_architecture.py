@@ -113,15 +113,26 @@ def test_code_names_the_encoding_of_each_text():
         assert not re.search(r"\.(read|write)_text\((?!encoding)|text=True", text), path
 
 
+def modules_after(program):
+    """Return the names of the modules that a Python program imports."""
+    program += "\nimport sys\nprint(*sys.modules)"
+    return subprocess.run(
+        [sys.executable, "-c", program], cwd=LIBRARY.parent, capture_output=True, text=True
+    ).stdout.split()
+
+
 def test_reading_the_rules_imports_nothing_heavy():
     lines = "\n".join(file.read_text() for file in (ROOT / "rules").rglob("*.smk"))
     imports = re.findall(r"^from lightfield\S* import (?:\([^)]*\)|.*)", lines, re.M)
-    program = "\n".join([*imports, "import sys", "print(*sys.modules)"])
-    modules = subprocess.run(
-        [sys.executable, "-c", program], cwd=LIBRARY.parent, capture_output=True, text=True
-    ).stdout.split()
+    modules = modules_after("\n".join(imports))
     assert "lightfield.planning.loading" in modules
     assert not {"numba", "skimage", "scipy", "OpenImageIO", "matplotlib", "bpy"} & set(modules)
+
+
+def test_placing_the_cameras_of_a_built_scene_imports_no_models_of_other_keys():
+    modules = modules_after("import lightfield.stages.rig")
+    assert "lightfield.geometry.rigs" in modules
+    assert not {"lightfield.configuration.scene_yaml", "lightfield.exporters"} & set(modules)
 
 
 # The modules by which the workflow knows what is finished, outdated or damaged.

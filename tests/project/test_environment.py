@@ -1,6 +1,7 @@
 """Which Python `make` takes (the first that runs, else uv downloads one), and what it installs."""
 
 import os
+import re
 import runpy
 import shutil
 import subprocess
@@ -172,3 +173,30 @@ def test_make_does_not_replace_the_environment_of_another_checkout(name, tmp_pat
     assert result.returncode != 0
     assert result.stderr.startswith(f"error: {name} is a link to {other}, which make would replace")
     assert [path.name for path in other.iterdir()] == ["installed"]
+
+
+PLUGIN = "snakemake-executor-plugin-slurm"
+VERSIONS = ("3.11", "3.13")
+
+
+def locked(name, version):
+    """Return the lines of a lock with a package and its version."""
+    lock = (ROOT / f"envs/{name}-{version}.txt").read_text()
+    return dict(re.findall(r"^([a-z0-9.-]+)==([^\s\\;]+)", lock, re.M))
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_build_without_slurm_installs_neither_the_executor_nor_pandas(version):
+    """Snakemake imports all executors at each start, and this one imports pandas."""
+    assert not {PLUGIN, "pandas"} & locked("requirements", version).keys()
+    assert not {PLUGIN, "pandas"} & locked("requirements-storage", version).keys()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_slurm_and_a_storage_add_to_a_build_and_change_no_version_of_it(version):
+    build, tests = locked("requirements", version), locked("requirements-test", version)
+    slurm, storage = (locked(f"requirements-{name}", version) for name in ("slurm", "storage"))
+    assert PLUGIN in slurm and PLUGIN in tests
+    assert build.items() <= slurm.items() <= tests.items()
+    assert build.items() <= storage.items()
+    assert all(slurm[name] == storage[name] for name in slurm.keys() & storage.keys())

@@ -60,7 +60,7 @@ def folder(tmp_path_factory):
     (programs / "activate").unlink()
     (programs / "activate").write_text(f"export PATH={programs}:$PATH\n")
     # This order, so that make sets up nothing.
-    for stamp in ("packages", "complete"):
+    for stamp in ("packages", "complete", "complete-with-slurm"):
         (folder / ".venv" / stamp).touch()
     return folder
 

@@ -165,7 +165,8 @@ def test_an_export_in_a_folder_with_another_name_is_recognised_by_its_list(folde
     dataset = shutil.copytree(folder, tmp_path / "dataset")
     write_json(dataset / "perspective/exports/mine/export.json", {"format": "miv"})
     card = package.card(dataset, NAME, load_scene("smoke"))
-    assert card["loaders"]["perspective/exports/mine"].startswith("Encoder -c perspective/exports")
+    loader = card["loaders"]["perspective/exports/mine"]
+    assert loader.startswith("Encoder -c CONFIGURATION -p inputDirectory perspective/exports/mine/")
     for content, why in (({"format": "x"}, "format: is 'x'; must be one of"), ({}, "is missing")):
         write_json(dataset / "perspective/exports/mine/export.json", content)
         with pytest.raises(UserError, match=rf"mine/export.json: .*{why}"):

@@ -119,6 +119,9 @@ rigs:
     camera: {lens: rectilinear, fov: 70, resolution: [16, 16]}
 exports:
   dnerf: {sources: [views], points: 20}
+  miv_frames: {sources: [views], rate: 24}
+  opendibr_frames: {sources: [views], rate: 24}
+  ncore_frames: {sources: [views], points: 20, rate: 24}
   poses_csv: {sources: [views]}
 report: {panorama: false}
 """
@@ -128,7 +131,7 @@ report: {panorama: false}
 def test_all_frames_go_into_one_export_of_the_sequence(tmp_path):
     folder = checkout(tmp_path, moving=TRAINED)
     arguments = ("package", "--config", "scenes=[moving]", "rigs=all", "preset=full")
-    assert planned(folder, *arguments)["export_sequence"] == 1
+    assert planned(folder, *arguments)["export_sequence"] == 4
     result = snakemake(folder, "--cores", "2", *arguments)
     assert result.returncode == 0, result.stdout + result.stderr
     # A package has the walk of the first frame's page.
@@ -143,6 +146,11 @@ def test_all_frames_go_into_one_export_of_the_sequence(tmp_path):
     assert lists == {"export.json", *(f"transforms_{part}.json" for part in parts)}
     content = json.loads((rig / "exports/dnerf/transforms_train.json").read_text())
     assert [frame["time"] for frame in content["frames"]] == [0, 1]
+    assert json.loads((rig / "exports/miv_frames/sequence.json").read_text())["Fps"] == 24
+    assert len([*rig.glob("exports/opendibr_frames/*.mp4")]) == 4
+    sequence = json.loads((rig / "exports/ncore_frames/views.json").read_text())
+    # The second frame is a 24th of a second after the first.
+    assert sequence["sequence_timestamp_interval_us"] == {"start": 0, "stop": 41668}
     # Other exports are made frame by frame.
     assert len([*rig.glob("f0000?/exports/poses_csv/poses.csv")]) == 2
     with tarfile.open(folder / "results/moving/moving_LFPair.tar") as archive:

@@ -169,13 +169,20 @@ def test_views_around_it_agree(rendered, reproject_dataset, tmp_path):
         assert checks[name].passed, (name, checks[name].problems)
 
 
-def test_passes_that_a_shadow_catcher_spoils_are_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("roughness", "whose values are wrong in roughness; "),
+        ("variance", "whose shadows are no means of samples, as variance needs; "),
+    ],
+)
+def test_passes_that_a_shadow_catcher_spoils_are_refused(name, reason, tmp_path):
     from lightfield.rendering.setup import cycles
 
     write_scene(tmp_path / "catcher.blend")
     content = {**lenses.from_camera(CAMERA).to_lightfield(), "frame": 1}
-    lightfield = LightField({**content, "render": RENDER | {"passes": ["roughness"]}}, [])
-    refusal = "^render.passes: ground is a shadow catcher, whose values are wrong in roughness; "
+    lightfield = LightField({**content, "render": RENDER | {"passes": [name]}}, [])
+    refusal = f"^render.passes: ground is a shadow catcher, {reason}"
     with pytest.raises(UserError, match=refusal):
         cycles.set_up(tmp_path / "catcher.blend", None, lightfield, "cpu", 1)
 

@@ -54,7 +54,7 @@ def images(opened, lightfield):
 @pytest.mark.parametrize(
     "settings",
     [
-        {"passes": list(PASSES)},
+        {"passes": list(PASSES), "samples": 8},
         {"light_groups": {"top": ["lamp"]}},
         {"samples": 256, "adaptive_threshold": 0.03},
     ],

@@ -10,7 +10,7 @@ from lightfield.report import page
 
 MODULES = sorted(page.TEMPLATES.glob("*/*.js"))
 # The scripts of a dataset's page share a scope. Other pages have one of their own.
-OF_DATASET = ("page", "walk", "relight", "walk_alone")
+OF_DATASET = ("page", "walk", "relight", "focus", "walk_alone")
 OTHERS = ("index", "corpus", "sequence")
 DECLARED = re.compile(r"^(export )?(?:async function|function|const|let) (\w+)", re.MULTILINE)
 IMPORTED = re.compile(r'^import {(.+)} from "(.+)";', re.MULTILINE)

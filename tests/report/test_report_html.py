@@ -3,6 +3,7 @@
 import base64
 import io
 import json
+import math
 import re
 from types import SimpleNamespace
 
@@ -11,7 +12,8 @@ import numpy as np
 import pytest
 from conftest import SMALL_WALK
 from PIL import Image
-from sphere import BALL, BALL_RADIUS, RADIUS, colour_of, look, look_at_ball_alone
+from scipy.ndimage import map_coordinates
+from sphere import BALL, BALL_RADIUS, RADIUS, colour_of, look, look_at_ball, look_at_ball_alone
 
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_json
@@ -476,6 +478,20 @@ def test_each_pass_of_the_middle_view_is_shown(show, tmp_path):
     assert pictures["albedo"] == [[255, 0, 0], [0, 0, 0]]
     assert pictures["flow"] == [[255, 0, 0], [102, 0, 0]]
     assert "normal/" in tab.locator("#files").inner_text()
+
+
+def test_the_noise_is_the_error_that_the_variance_says(tmp_path):
+    """All colours are equal, so that middle grey is 0.18. The standard deviation is a tenth."""
+    grey = np.full((48, 64, 3), 3.0, np.float32)
+    lightfield = write_dataset(tmp_path, LINE, see=lambda lens, pose: (grey, look(lens, pose)[1]))
+    render = lightfield.render.changed(passes=["variance"])
+    lightfield.changed(render=render.to_json()).write(tmp_path / "lightfield.json")
+    for view in lightfield.views:
+        planes = dict.fromkeys("RGB", np.full(grey.shape[:2], 0.3**2, np.float32))
+        images.write_exr(PASSES["variance"].path(tmp_path, view.name), planes)
+    text = make_page(tmp_path, LINE).read_text()
+    # 0.018² / (0.18² + 0.01)
+    assert "relative mean squared error 0.0076" in text
 
 
 def test_a_scene_at_rest_has_a_white_picture_of_motion(tmp_path):
@@ -978,6 +994,139 @@ def test_a_page_relights_a_view(lit, show):
 def test_a_page_without_light_groups_relights_nothing(sphere):
     text = sphere.page.read_text()
     assert 'id="lit"' not in text and "drawLit" not in text
+
+
+PLANE = {
+    "type": "plane",
+    "cameras": [7, 5],
+    "size": [0.6, 0, 0.4],
+    "center": [0, -0.5, 0],
+    "camera": {"lens": "rectilinear", "fov": 60, "resolution": [96, 72]},
+}
+
+
+FISHEYE_PLANE = PLANE | {"camera": {"lens": "equidistant", "fov": 120, "resolution": [96, 96]}}
+
+
+@pytest.fixture(scope="module")
+def focused(tmp_path_factory):
+    """The page of a plane of cameras before a ball in a sphere, and the dataset's folder."""
+    folder = tmp_path_factory.mktemp("results") / "ball" / "LFPlane"
+    write_dataset(folder, PLANE, see=look_at_ball)
+    return folder, make_page(folder, PLANE, name="ball/LFPlane")
+
+
+@pytest.fixture(scope="module")
+def focused_fisheye(tmp_path_factory):
+    """The same through a fisheye, whose depth is the distance."""
+    folder = tmp_path_factory.mktemp("results") / "ball" / "LFPlane"
+    write_dataset(folder, FISHEYE_PLANE, see=look_at_ball)
+    return folder, make_page(folder, FISHEYE_PLANE, name="ball/LFPlane")
+
+
+def seen_by_pinhole(directions):
+    """Return where views of PLANE see directions (..., 3): pixels' numbers down and across."""
+    right, up, back = np.moveaxis(directions, -1, 0)
+    focal = 48 / math.tan(math.radians(30))
+    return 35.5 - focal * up / -back, 47.5 + focal * right / -back
+
+
+def seen_by_fisheye(directions):
+    """Return where views of FISHEYE_PLANE see directions. Its radius grows with the angle."""
+    right, up, back = np.moveaxis(directions, -1, 0)
+    aside = np.hypot(right, up)
+    radius = 48 * np.arctan2(aside, -back) / math.radians(60) / aside
+    return 47.5 - radius * up, 47.5 + radius * right
+
+
+def refocused(folder, distance, size, tangent, seen):
+    """Return the mean light of the views, in which a plane at a distance is sharp.
+
+    The picture has this ``size``, and the ``tangent`` of half its angle across. ``seen`` returns
+    where a view sees directions.
+    """
+    width, height = size
+    step = 2 * tangent / width
+    y, x = np.mgrid[:height, :width] + 0.5
+    plane = np.stack([step * (x - width / 2), step * (height / 2 - y), -np.ones_like(x)], -1)
+    total, count = np.zeros((height, width, 3)), np.zeros((height, width, 1))
+    for view in LightField.read(folder / "lightfield.json").views:
+        colour = images.read_image(folder / "exr" / f"{view.name}.exr").colour
+        right, _, up = view.position - np.array(PLANE["center"])
+        at = seen(distance * plane - [right, up, 0])
+        ends = colour.shape[0] - 1, colour.shape[1] - 1
+        inside = np.all([(a >= 0) & (a <= end) for a, end in zip(at, ends, strict=True)], axis=0)
+        for channel in range(3):
+            sampled = map_coordinates(colour[..., channel], at, order=1, mode="nearest")
+            total[..., channel] += inside * sampled
+        count += inside[..., np.newaxis]
+    return total / count
+
+
+@pytest.mark.parametrize(
+    ("page_of", "size", "tangent", "seen"),
+    [
+        ("focused", (96, 72), math.tan(math.radians(30)), seen_by_pinhole),
+        ("focused_fisheye", (96, 96), 1.0, seen_by_fisheye),
+    ],
+)
+def test_the_page_of_a_plane_has_a_slider_of_the_focus(page_of, size, tangent, seen, request, show):
+    folder, html = request.getfixturevalue(page_of)
+    tab = show(html, width=1280)
+    tab.locator("#focused[aria-busy=false]").wait_for()
+    data = json.loads(tab.text_content("#data"))
+    distances = data["focus"]["distances"]
+    assert data["focus"]["size"] == [*size]
+    # From the ball to the wall behind it, without the nearest and the farthest 1 %.
+    assert len(distances) == 12
+    assert 0.9 * (RADIUS + 0.5) < max(distances) < RADIUS + 0.5
+    assert BALL[1] - BALL_RADIUS + 0.5 < min(distances) < 1.1 * (BALL[1] - BALL_RADIUS + 0.5)
+    np.testing.assert_allclose(np.diff(1 / np.array(distances), 2), 0, atol=1e-3)
+    light = light_of_codes(data)
+    for number in (0, 6, 11):
+        move(tab, "focus", number)
+        written = tab.inner_text("#focus-value")
+        assert written == tab.get_attribute("#focus", "aria-valuetext")
+        assert float(written.removesuffix(" m")) == pytest.approx(distances[number], rel=0.01)
+        codes = decoded(data["focus"]["pictures"][number])
+        # Steps of light, the loss of the picture's file, and linear interpolation.
+        expected = refocused(folder, distances[number], size, tangent, seen)
+        assert np.abs(light[codes] - expected)[2:-2, 2:-2].mean() < 0.01
+        shown = pixels(tab, "focused")[..., :3]
+        developed = pictures.develop(np.float32(light[codes]), data["exposure"])
+        assert np.abs(shown - developed.astype(int)).max() <= 1
+    # The exposure chosen above applies here, too.
+    before = pixels(tab, "focused")[..., :3].mean()
+    move(tab, "exposure", 1)
+    assert pixels(tab, "focused")[..., :3].mean() > before + 10
+
+
+def light_of_codes(data):
+    """Return the light of each code."""
+    toe, highest = data["light"]
+    return toe * np.expm1(np.arange(256) / 255 * math.log1p(highest / toe))
+
+
+def test_the_focus_is_chosen_with_keys(focused, show):
+    tab = show(focused[1], width=1280)
+    tab.locator("#focused[aria-busy=false]").wait_for()
+    before, distance = pixels(tab, "focused"), tab.inner_text("#focus-value")
+    tab.focus("#focus")
+    tab.keyboard.press("ArrowLeft")
+    assert float(tab.inner_text("#focus-value").split()[0]) < float(distance.split()[0])
+    assert (pixels(tab, "focused") != before).any()
+
+
+@pytest.mark.parametrize("width", accessibility.WIDTHS)
+def test_axe_finds_no_fault_in_a_page_with_a_focus(focused, show, width):
+    tab = show(focused[1], width, walk_scale=SMALL_WALK)
+    tab.locator("#focused[aria-busy=false]").wait_for()
+    assert accessibility.faults(tab) == []
+
+
+def test_the_page_of_another_rig_has_no_focus(sphere):
+    text = sphere.page.read_text()
+    assert 'id="focused"' not in text and "drawFocused" not in text and '"focus"' not in text
 
 
 @pytest.mark.parametrize(

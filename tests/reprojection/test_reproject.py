@@ -12,6 +12,7 @@ import bookkeeping
 import cv2
 import forks
 import numpy as np
+import OpenEXR
 import pytest
 from conftest import BLENDER, SCRIPTS
 
@@ -688,6 +689,55 @@ def test_a_settings_file_gives_the_bytes_of_the_flags(dataset, run, tmp_path, fl
     (tmp_path / "settings.json").write_text(json.dumps({**settings, "depth_png": 1000}))
     run("--settings", str(tmp_path / "settings.json"))
     assert {path.name: path.read_bytes() for path in (dataset / "out").iterdir()} == by_flags
+
+
+def deflate_effort(path, rows=24):
+    """Return the effort that the first zlib stream of an EXR notes: 0 fastest, 1 fast, 2 usual."""
+    content = path.read_bytes()
+    table = 8 * math.ceil(rows / 16)
+    # The table of blocks lies before the first block, whose place is its first entry.
+    place = next(
+        place
+        for place in range(table, len(content))
+        if int.from_bytes(content[place - table : place - table + 8], "little") == place
+    )
+    return content[place + 9] >> 6
+
+
+def test_exr_files_are_zip_at_its_fastest_level(dataset, run):
+    run(*PERSPECTIVE, "--exr")
+    path = dataset / "out" / "view_0000f.exr"
+    header = OpenEXR.File(str(path), header_only=True).header()
+    assert header["compression"] == OpenEXR.ZIP_COMPRESSION
+    assert deflate_effort(path) == 0
+    # Other files are as small as before.
+    write_exr(dataset / "other.exr", read_image(path).channels)
+    assert deflate_effort(dataset / "other.exr") == 1
+
+
+def test_the_compression_of_a_reprojection_keeps_every_pixel(dataset, run, tmp_path):
+    out = dataset / "out" / "view_0000f.exr"
+    settings = {"camera": CAMERA, "formats": ["exr"]}
+    (tmp_path / "settings.json").write_text(json.dumps(settings))
+    run("--settings", str(tmp_path / "settings.json"))
+    zipped = read_image(out)
+    (tmp_path / "settings.json").write_text(json.dumps(settings | {"compression": "htj2k"}))
+    # The files of another compression are outdated.
+    run("--settings", str(tmp_path / "settings.json"))
+    file = OpenEXR.File(str(out), separate_channels=True)
+    assert file.header()["compression"] == OpenEXR.HTJ2K256_COMPRESSION
+    pixels = {name: channel.pixels for name, channel in file.channels().items()}
+    assert pixels.keys() == zipped.channels.keys() == set("RGBZ")
+    assert all(np.array_equal(pixels[name], zipped.channels[name]) for name in pixels)
+
+
+def test_a_compression_that_openexr_lacks_is_refused(dataset, run, tmp_path, monkeypatch):
+    monkeypatch.delattr(OpenEXR, "ZSTD_COMPRESSION")
+    settings = {"camera": CAMERA, "formats": ["exr"], "compression": "zstd"}
+    (tmp_path / "settings.json").write_text(json.dumps(settings))
+    with pytest.raises(UserError, match=r"^compression: is 'zstd', which OpenEXR .* cannot write"):
+        run("--settings", str(tmp_path / "settings.json"))
+    assert not (dataset / "out").exists()
 
 
 @pytest.mark.parametrize(

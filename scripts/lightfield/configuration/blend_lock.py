@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from lightfield.configuration.scene_source import SceneSource
-from lightfield.configuration.scene_yaml import load_scene, scene_path
 from lightfield.core.errors import UserError
 from lightfield.core.files import read_json, write_json
 
@@ -13,6 +12,9 @@ def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
 
     The second value is the file that records it: the scene YAML or its lock file.
     """
+    # Import it only here, because it imports the models of all keys. Built scenes need none.
+    from lightfield.configuration.scene_yaml import scene_path
+
     if source.sha256:
         return source.sha256, scene_path(scene)
     lock = scene_path(scene).with_suffix(".lock.json")
@@ -22,12 +24,13 @@ def blend_sha256(scene: str, source: SceneSource) -> tuple[str | None, Path]:
         raise UserError(f"{lock}: sha256: is missing; remove the file to record it again") from None
 
 
-def expected_blend(scene: str, blend: Path, digest: str) -> Path | None:
+def expected_blend(scene: str, source: SceneSource, blend: Path, digest: str) -> Path | None:
     """Check that a .blend has the recorded SHA-256. Raises `UserError` if not.
 
-    Returns None. If none is recorded yet, returns the lock file that should record it.
+    ``source`` is as in the scene YAML. Returns None. If none is recorded yet, returns the lock file
+    that should record it.
     """
-    expected, origin = blend_sha256(scene, load_scene(scene).scene)
+    expected, origin = blend_sha256(scene, source)
     if expected in (None, digest):
         return origin if expected is None else None
     remedy = "write its sha256 there" if origin.suffix == ".yaml" else f"delete {origin}"

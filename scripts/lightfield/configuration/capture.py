@@ -17,6 +17,7 @@ from lightfield.engine.stage import cause
 from lightfield.formats import blend
 from lightfield.formats.inventory import read_inventory, scene_box
 from lightfield.formats.lightfield import MODEL_PLACEMENT, OMNIDIRECTIONAL
+from lightfield.formats.passes import VARIANCE
 from lightfield.formats.render_block import RenderBlock
 from lightfield.geometry import rigs
 from lightfield.geometry.rigs import BlendCamera, Poses, Rig
@@ -83,7 +84,13 @@ class Capture:
             rig = self.rig
             if render.samples == FILE:
                 most = render.most_samples or facts["samples"]
-                render = render.changed(samples=min(facts["samples"], most), most_samples=None)
+                samples = min(facts["samples"], most)
+                if samples < render.fewest_samples:
+                    raise UserError(
+                        f"{self.source.blend}: has {samples} samples a pixel; must have at least "
+                        f"{render.fewest_samples} for the pass {VARIANCE}; set render.samples"
+                    )
+                render = render.changed(samples=samples, most_samples=None)
             if blend.is_shutter_reset(facts, render):
                 # Earlier versions rendered these views otherwise: they need another key.
                 render = render.changed(shutter="centred")

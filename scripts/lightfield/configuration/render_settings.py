@@ -6,6 +6,7 @@ from typing import Self
 from pydantic import model_validator
 
 from lightfield.formats import light_groups
+from lightfield.formats.passes import VARIANCE
 from lightfield.formats.render_block import RenderOptions, TargetError
 
 # The keys of `Render` that a calibration chooses for a target error.
@@ -57,6 +58,25 @@ class Render(RenderOptions):
             raise ValueError(
                 f"target_error: may choose to denoise, which {reason}; write "
                 "{value: …, denoise: never}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _plain_variance(self) -> Self:
+        """Check that the variance is of plain samples, of which each part of them has some."""
+        if not self.has_variance:
+            return self
+        reason = f"does not go with the pass {VARIANCE}"
+        if self.denoise:
+            raise ValueError(f"denoise: {reason}, because denoised pixels are no means of samples")
+        if self.adaptive_threshold:
+            raise ValueError(f"adaptive_threshold: {reason}, because it depends on the noise")
+        if self.target_error is not None:
+            raise ValueError(f"target_error: {reason}, because it may choose to denoise")
+        if isinstance(self.samples, int) and self.samples < self.fewest_samples:
+            raise ValueError(
+                f"samples: is {self.samples}; must be at least {self.fewest_samples} for the pass "
+                f"{VARIANCE}"
             )
         return self
 

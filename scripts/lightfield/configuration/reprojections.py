@@ -20,7 +20,7 @@ from lightfield.imaging import blender_looks
 from lightfield.imaging.blender_looks import LookName
 from lightfield.imaging.look import Look
 from lightfield.settings.base import Name, Settings, Vector, as_list
-from lightfield.settings.types import REINHARD, Primaries, Stops, White
+from lightfield.settings.types import REINHARD, Compression, Primaries, Stops, White
 
 MOST_SAMPLES = 64
 """Samples along each side of a pixel."""
@@ -141,6 +141,9 @@ class Reprojection(ReprojectionOptions):
         description="Colour space of EXR images, which the files name in their attribute "
         "chromaticities.",
     )
+    compression: Compression | None = Field(
+        None, description="Lossless compression of the EXR files. The default is a fast zip."
+    )
     sensor: SensorSettings | None = Field(
         None, description="Sensor that makes the PNG images, instead of exposure and reinhard."
     )
@@ -247,6 +250,11 @@ class ReprojectionEntry(ReprojectionOptions):
         description="Colour space of EXR images, which the files name in their attribute "
         "chromaticities. Without this key, it is Rec. 709, and the files do not name it.",
     )
+    compression: Compression | None = Field(
+        None,
+        description="Lossless compression of the EXR files. The default is a fast zip, which every "
+        "program reads. htj2k is faster and smaller, but few programs read it.",
+    )
 
     @model_validator(mode="after")
     def _has_use(self) -> Self:
@@ -257,12 +265,14 @@ class ReprojectionEntry(ReprojectionOptions):
             raise ValueError("bits: is only for format png; an EXR has 16-bit floats")
         if self.format == "png" and self.primaries:
             raise ValueError("primaries: is only for format exr; a PNG is sRGB")
+        if self.format == "png" and self.compression and not self.passes:
+            raise ValueError("compression: is only for EXR files: format exr, or passes")
         if self.format == "exr" and self.look:
             raise ValueError("look: is only for format png; an EXR keeps the light")
         lights = [
             name
             for name in self.passes or ()
-            if name == LIGHT_GROUPS or PASSES[name].kind == "light"
+            if name == LIGHT_GROUPS or PASSES[name].kind in ("light", "variance")
         ]
         if self.primaries == "acescg" and lights:
             raise ValueError(f"primaries: does not go with the pass {lights[0]}, which is Rec. 709")
@@ -281,6 +291,7 @@ class ReprojectionEntry(ReprojectionOptions):
             passes=self.passes,
             relight=light,
             primaries=self.primaries,
+            compression=self.compression,
             look_source=blender_looks.source_of(self.look),
         )
 

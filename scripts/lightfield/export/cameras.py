@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from lightfield.geometry.lenses import Lens
+from lightfield.formats.lightfield import View
+from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.brown_conrady import BrownConrady
 from lightfield.geometry.lenses.calibrated import CalibratedLens
 from lightfield.geometry.lenses.equidistant import Equidistant
@@ -22,6 +23,17 @@ def focal_pixels(lens: Rectilinear | CalibratedLens | Equidistant) -> tuple[floa
         lens.focal_length * lens.width / lens.sensor[0],
         lens.focal_length * lens.height / lens.sensor[1],
     )
+
+
+def opencv_matrix(view: View) -> Array:
+    """Return a view's camera-to-world matrix (4, 4), with x right, y down and z forward."""
+    return np.asarray(view.world_from_camera @ np.diag([1.0, -1.0, -1.0, 1.0]))
+
+
+def opencv_pinhole(lens: Rectilinear) -> tuple[float, float, float, float]:
+    """Return fx, fy, cx, cy of a lens in pixels. The first pixel's centre is at (0, 0)."""
+    cx, cy = (middle - 0.5 for middle in lens.center)
+    return *focal_pixels(lens), cx, cy
 
 
 def opencv_fisheye(lens: Lens) -> tuple[float, ...]:

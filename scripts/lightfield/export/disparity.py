@@ -1,11 +1,14 @@
 """Depth as normalised disparity, as players and coders of immersive video keep it."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.export.source import Floats
+from lightfield.export.source import Floats, SourceDataset
+from lightfield.formats.lightfield import View
+from lightfield.geometry.depth import conventional_depth
 
 FARTHEST = 999.9
 """Metres. Disparity treats misses, and everything farther, as if they were at this distance."""
@@ -54,3 +57,29 @@ def levels(
     highest = 2**bits - 1
     quantised = np.clip(np.round(disparity * highest), lowest, highest)
     return np.where(depth > 0, quantised, 0).astype(np.uint16)
+
+
+class DisparityFrames:
+    """The normalised disparity of a ``view`` in each of the ``frames``, read one after the other.
+
+    ``limits`` are its nearest and its farthest depth in all frames, in metres.
+    """
+
+    def __init__(self, frames: Sequence[SourceDataset], view: View, farther: Farther) -> None:
+        self._frames = frames
+        self._view = view
+        ranges = []
+        for depth in self._depths():
+            farther.count(depth)
+            ranges.append(depth_range(depth))
+        nearest, farthest = zip(*ranges, strict=True)
+        self.limits: tuple[float, float] = (min(nearest), max(farthest))
+
+    def levels(self, bits: int, lowest: int) -> Iterator[NDArray[np.uint16]]:
+        """Yield the `levels` (h, w) of each frame."""
+        for depth in self._depths():
+            yield levels(depth, self.limits, bits, lowest)
+
+    def _depths(self) -> Iterator[Floats]:
+        meaning = conventional_depth(self._frames[0].lens)
+        return (frame.depth(self._view, meaning) for frame in self._frames)

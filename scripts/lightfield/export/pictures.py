@@ -65,3 +65,10 @@ def normal_colours(source: SourceDataset, view: View) -> NDArray[np.uint8]:
     world: Floats = source.view(view).normal.astype(np.float64)
     local = world @ view.world_from_camera[:3, :3] * _FLIP
     return np.asarray(np.round((local + 1) / 2 * 255), np.uint8)
+
+
+def write_z(source: SourceDataset, view: View, path: Path) -> None:
+    """Write a view's Z in metres as an EXR, 0 for none. OpenCV reads its channel Y as a plane."""
+    depth = source.depth(view, "z")
+    known = np.where(np.isfinite(depth), depth, 0).astype(np.float32)
+    images.write_exr(path, {"Y": known})

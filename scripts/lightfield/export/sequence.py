@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -103,6 +104,23 @@ class SourceSequence:
     def times(self) -> list[float]:
         """The time of each frame: 0 for the first, 1 for the last."""
         return frame_times(self.numbers)
+
+    def seconds(self, rate: float) -> list[float]:
+        """Return the time of each frame, 0 for the first, of an animation of ``rate`` Hz."""
+        return [(number - self.numbers[0]) / rate for number in self.numbers]
+
+    def video_rate(self, rate: float) -> float:
+        """Return the frames a second of a video of the sequence, of an animation of ``rate`` Hz.
+
+        Raises `UserError` if the frames do not follow one another at equal steps.
+        """
+        steps = {following - number for number, following in pairwise(self.numbers)}
+        if len(steps) > 1:
+            raise UserError(
+                f"{self.dataset}: frames: are {', '.join(map(str, self.numbers))}; a video needs "
+                "frames at equal steps"
+            )
+        return rate / steps.pop()
 
     def require_still_cameras(self) -> None:
         """Raise `UserError` if a camera moves: the consumer has one pose for all frames."""

@@ -137,15 +137,43 @@ class SourceDataset:
         image = self.view(view).image()
         if self.suffix == ".png":
             return image.srgb
-        transparent = self.lightfield.transparent
-        colour = image.straight if transparent else image.colour
+        if self.lightfield.transparent:
+            return self.developed(image.straight, image.covered)
+        return self.developed(image.colour)
+
+    def developed(
+        self, colour: NDArray[np.float32], covered: NDArray[np.float32] | None = None
+    ) -> NDArray[np.uint8]:
+        """Return linear light (height, width, 3) as sRGB pixels, as the source's views have them.
+
+        Transparent light is divided by its alpha, and ``covered`` (height, width, 1) is what it was
+        divided by.
+        """
         if self.look:
-            covered = image.covered if transparent else None
             return np.asarray(self.look.to_pixels(colour, 8, covered), np.uint8)
         # Only here, because its kernels take long to load, and most exports link developed views.
         from lightfield.imaging.tonemap import to_8_bit, tone_map
 
+        if self.suffix == ".png":
+            return to_8_bit(colour)
         return to_8_bit(tone_map(colour, self.exposure, self.reinhard))
+
+    def light(self, view: View) -> Floats:
+        """Return a view's linear light with alpha (height, width, 4), multiplied by the alpha.
+
+        PNG views are decoded, so their light is what they show. Alpha is 1 in opaque views.
+        """
+        from lightfield.imaging.tonemap import decode_srgb
+
+        image = self.view(view).image()
+        alpha = np.ones(image.channels["R"].shape)
+        if self.lightfield.transparent:
+            alpha = image.alpha
+        if self.suffix == ".png":
+            colour = decode_srgb(image.encoded) * alpha[..., np.newaxis]
+        else:
+            colour = image.colour
+        return np.concatenate([colour, alpha[..., np.newaxis]], axis=-1)
 
     def alpha(self, view: View) -> NDArray[np.uint8]:
         """Return the coverage of each pixel (height, width), 0 to 255. 0 where it has no light."""

@@ -1,14 +1,14 @@
 """Encodes raw video frames: planar 4:2:0, little-endian 16-bit samples (ffmpeg's yuv420p10le)."""
 
-import subprocess
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path
 from lightfield.export.source import Floats
+from lightfield.imaging.ffmpeg import encoding
 
 
 def of_colour(encoded: Floats, bits: int) -> bytes:
@@ -33,16 +33,32 @@ def of_levels(levels: NDArray[np.uint16], bits: int) -> bytes:
     return levels.astype("<u2").tobytes() + grey.tobytes()
 
 
-def write_hevc(path: Path, frame: bytes, size: tuple[int, int], bits: int) -> None:
-    """Write one frame as lossless H.265 with ffmpeg. Raises `UserError` if ffmpeg fails."""
+def write_raw(path: Path, frames: Iterable[bytes]) -> None:
+    """Write the frames one after the other, without a header."""
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        file.writelines(frames)
+
+
+def write_hevc(
+    path: Path,
+    frames: Iterable[bytes],
+    size: tuple[int, int],
+    bits: int,
+    rate: float | None = None,
+) -> None:
+    """Write frames as lossless H.265 with ffmpeg: one, or several with ``rate`` a second.
+
+    Frames are coded in the order of time, because OpenDIBR shows them as they are decoded. Raises
+    `UserError` if ffmpeg fails.
+    """
     pixel_format = ["-pix_fmt", f"yuv420p{bits}le"]
-    raw_input = ["-f", "rawvideo", *pixel_format, "-s", f"{size[0]}x{size[1]}", "-i", "-"]
+    raw_input = ["-f", "rawvideo", *pixel_format, "-s", f"{size[0]}x{size[1]}"]
     codec = ["-c:v", "libx265", "-x265-params", "lossless=1:log-level=none:pools=1:info=0"]
     reproducible = ["-fflags", "+bitexact", "-flags:v", "+bitexact", *pixel_format]
-    with atomic_path(path) as temporary:
-        options = [*raw_input, *codec, *reproducible]
-        command = ["ffmpeg", "-v", "error", "-y", *options, str(temporary)]
-        result = subprocess.run(command, input=frame, capture_output=True, check=False)
-        if result.returncode:
-            problem = " ".join(result.stderr.decode(errors="replace").split())
-            raise UserError(f"{path}: ffmpeg cannot write H.265 of {bits} bits: {problem}")
+    if rate is not None:
+        raw_input += ["-r", repr(rate)]
+        codec[-1] += ":bframes=0"
+    options = [*raw_input, "-i", "-", *codec, *reproducible]
+    with encoding(path, options, f"H.265 of {bits} bits") as add:
+        for frame in frames:
+            add(frame)

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
 
+import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from lightfield.core.names import PARTS, VIEWS
@@ -21,15 +22,27 @@ from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.rigs import BlendCamera, Rig
+from lightfield.geometry.rigs.plane import Plane
 from lightfield.imaging import blender_looks
 from lightfield.imaging.blender_looks import LookName
-from lightfield.settings.base import ReaderSettings, Settings
+from lightfield.settings.base import FARTHEST, ReaderSettings, Settings
 from lightfield.settings.types import REINHARD, Stops, White, unique_names
 
 EXPORTERS: dict[str, "type[Export]"] = {}
 """All exporters by their names."""
 
 PointCount = Annotated[int, Field(ge=1)]
+AnimationRate = Annotated[
+    float,
+    Field(
+        gt=0,
+        le=1000,
+        description="Frames of the animation in a second. If the rig leaves out frames, the export "
+        "has fewer in a second.",
+        json_schema_extra={"unit": "Hz"},
+    ),
+]
+Metres = Annotated[float, Field(gt=0, le=FARTHEST)]
 # Refusals of views without depth. What to do depends on the source, so scene_checks/exports.py
 # adds it.
 NO_DEPTH = "holds no depth"
@@ -139,6 +152,10 @@ class Export(Settings, ABC):
             return "has only one view, so no view is left for testing"
         return None
 
+    def picture_sizes(self, source: Any) -> set[tuple[int, int]]:
+        """Return the widths and heights of the export's pictures: of its views, by default."""
+        return {(lens.width, lens.height) for lens in source.lenses}
+
     @abstractmethod
     def export(self, source: Any, folder: Path) -> None:
         """Write the views of a `SourceDataset`, or of a `SourceSequence`, into ``folder``.
@@ -238,6 +255,15 @@ def centred_pinhole(lens: Lens) -> str | None:
     if lens.center != (lens.width / 2, lens.height / 2) or not lens.has_square_pixels:
         return "has its axis off centre or oblong pixels, which this layout cannot describe"
     return None
+
+
+def plane_refusal(rig: Rig) -> str | None:
+    """Return why a rig is no plane of several cameras that look in parallel. None if it is."""
+    is_turned = rig.mount is not None and bool(np.any(rig.mount.rotation))
+    is_parallel = not (rig.cube_map or rig.stereo or rig.look_at is not None or is_turned)
+    if not isinstance(rig, Plane) or not is_parallel:
+        return "is not a rig of type plane with parallel cameras, which this export needs"
+    return "has only one view" if rig.view_count == 1 else None
 
 
 Options = TypeVar("Options", bound=Export)

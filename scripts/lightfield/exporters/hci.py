@@ -22,9 +22,9 @@ from pydantic import Field
 from lightfield.core.errors import UserError
 from lightfield.core.files import write_bytes, write_text
 from lightfield.core.progress import Progress
-from lightfield.export import cameras
+from lightfield.export import camera_grid, cameras
 from lightfield.export.source import Floats, SourceDataset
-from lightfield.exporters.base import NO_DEPTH, Developed, centred_pinhole
+from lightfield.exporters.base import NO_DEPTH, Developed, centred_pinhole, plane_refusal
 from lightfield.formats.lightfield import LightField, View
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
@@ -56,11 +56,10 @@ class Hci(Developed):
         return centred_pinhole(lens) or (None if has_depth else NO_DEPTH)
 
     def rig_refusal(self, rig: Rig) -> str | None:
-        if not isinstance(rig, Plane) or rig.cube_map or rig.look_at is not None:
-            return "is not a rig of type plane with parallel cameras, which HCI's layout needs"
+        if refusal := plane_refusal(rig):
+            return refusal
+        assert isinstance(rig, Plane)
         steps = rig.steps
-        if not steps:
-            return "has only one view"
         if math.isclose(steps[0], steps[-1], rel_tol=1e-6):
             return None
         return (
@@ -104,24 +103,15 @@ def grid(lightfield: LightField) -> tuple[list[View], int, float]:
 
     Raises `UserError` if the views are not a regular grid in the plane of their images.
     """
-    views = list(lightfield.views)
-    rotations = lightfield.world_from_cameras[:, :3, :3]
-    places = lightfield.world_from_cameras[:, :3, 3] @ rotations[0]
-    x, y, z = (np.unique(np.round(places[:, axis], 9)) for axis in range(3))
-    steps = np.concatenate([np.diff(x), np.diff(y)])
-    regular = (
-        np.allclose(rotations, rotations[0], atol=1e-6)
-        and np.ptp(z) < 1e-6
-        and len(x) * len(y) == len(views) > 1
-        and np.ptp(steps) < 1e-6 * steps.max()
-    )
-    if not regular:
+    grid = camera_grid.find(lightfield.world_from_cameras)
+    steps = grid.steps if grid else np.empty(0)
+    if not grid or not grid.is_flat or not steps.size or np.ptp(steps) >= 1e-6 * np.max(steps):
         raise UserError(
             f"{lightfield.path}: frames: are not a grid of cameras that look in parallel, with "
             "equal distances across and down; this layout needs one: give the plane a baseline"
         )
-    order = np.lexsort((places[:, 0].round(9), -places[:, 1].round(9)))
-    return [views[index] for index in order], len(x), float(steps.mean())
+    views = [lightfield.views[number] for number in grid.views.ravel().tolist()]
+    return views, len(grid.right), float(steps.mean())
 
 
 def parameters(

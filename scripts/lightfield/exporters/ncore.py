@@ -54,6 +54,7 @@ from lightfield.imaging import images
 SEQUENCE = "views"
 CAMERA = "camera"
 _LIDAR = "points"
+_LIDAR_FRAMES = f"lidars/{_LIDAR}/frames"
 WORLD = "world"
 # NCore's readers open the component of this name.
 _DEFAULT = "default"
@@ -72,13 +73,14 @@ _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True)
-class _Frame:
+class Frame:
     """The times of a view's picture in microseconds, and the camera's poses (4, 4) by their times.
 
-    All rows see light from ``start`` to ``end``, or the first at ``start`` and the last at ``end``.
-    ``exposure`` is the exposure of a moving camera.
+    ``source`` has the view. All rows see light from ``start`` to ``end``, or the first at ``start``
+    and the last at ``end``. ``exposure`` is the exposure of a moving camera.
     """
 
+    source: SourceDataset
     view: View
     start: int
     end: int
@@ -86,50 +88,60 @@ class _Frame:
     exposure: tuple[int, int] | None = None
 
     @classmethod
-    def of(cls, view: View, index: int, rows: tuple[float, float] | None) -> "_Frame":
-        """Return the frame of the view at this ``index`` of the sequence.
+    def of(
+        cls,
+        source: SourceDataset,
+        view: View,
+        begin: int,
+        duration: int,
+        rows: tuple[float, float] | None,
+    ) -> "Frame":
+        """Return the frame of a view. Its exposure lasts from ``begin``, for this ``duration``.
 
         ``rows`` are the times, −½ to ½, of the first and the last row of a rolling shutter.
         """
-        begin = index * STEP
         if view.exposure is None:
-            return cls(view, begin, begin, {begin: view.world_from_camera})
-        middle = begin + EXPOSURE // 2
-        start, end = (middle + round(time * EXPOSURE) for time in rows or (0, 0))
+            return cls(source, view, begin, begin, {begin: view.world_from_camera})
+        middle = begin + duration // 2
+        start, end = (middle + round(time * duration) for time in rows or (0, 0))
         poses = {
-            time: pose_between(*view.exposure, (time - begin) / EXPOSURE)
-            for time in sorted({begin, start, middle, end, begin + EXPOSURE})
+            time: pose_between(*view.exposure, (time - begin) / duration)
+            for time in sorted({begin, start, middle, end, begin + duration})
         }
-        return cls(view, start, end, poses, (begin, begin + EXPOSURE))
+        return cls(source, view, start, end, poses, (begin, begin + duration))
 
 
 @dataclass(frozen=True)
-class _Stream:
+class Stream:
     """The frames of a camera. ``is_rolling`` says whether its rows have times of their own."""
 
     name: str
     lens: Lens
-    frames: Sequence[_Frame]
+    frames: Sequence[Frame]
     is_rolling: bool
 
     @classmethod
-    def of(cls, source: SourceDataset, sensor: heads.HeadSensor, number: int) -> "_Stream":
+    def of(cls, source: SourceDataset, sensor: heads.HeadSensor, number: int) -> "Stream":
         """Return the stream of a source's camera. In a head, equal times are equal places."""
-        rows = _row_times(source, sensor.lens)
+        rows = row_times_of(source, sensor.lens)
         views = sorted(sensor.views, key=lambda view: view.name)
-        frames = [_Frame.of(view, index, rows) for index, view in enumerate(views)]
+        frames = [
+            Frame.of(source, view, index * STEP, EXPOSURE, rows) for index, view in enumerate(views)
+        ]
         name = f"{CAMERA}{number or ''}"
         if sensor.mount:
-            name = sensor.mount.name
-        if name in (_LIDAR, WORLD):
-            raise UserError(
-                f"{source.lightfield.path}: head: NCore has a {name} itself; give the camera "
-                "another name"
-            )
+            name = free_name(sensor.mount.name, f"{source.lightfield.path}: head")
         return cls(name, sensor.lens, frames, rows is not None)
 
 
-def _row_times(source: SourceDataset, lens: Lens) -> tuple[float, float] | None:
+def free_name(name: str, place: str) -> str:
+    """Return the name of a camera. Raises `UserError` with the ``place`` if NCore has it itself."""
+    if name in (_LIDAR, WORLD):
+        raise UserError(f"{place}: NCore has a {name} itself; give the camera another name")
+    return name
+
+
+def row_times_of(source: SourceDataset, lens: Lens) -> tuple[float, float] | None:
     """Return the times of a lens's first and last row with a rolling shutter. None without one.
 
     Raises `UserError` if resampling mixed the rows.
@@ -147,22 +159,11 @@ def _row_times(source: SourceDataset, lens: Lens) -> tuple[float, float] | None:
     return float(times[0]), float(times[-1])
 
 
-class NCore(ForTraining):
-    """A sequence of NCore v4, for gsplat and 3DGRUT."""
+class NCoreSequence(ForTraining):
+    """The options of exports that are sequences of NCore v4."""
 
-    name = "ncore"
-    summary = "NCore v4 for gsplat and 3DGRUT, also for fisheyes wider than 180°."
-    rank = 9
-    loader = (
-        "python simple_trainer.py mcmc --data-type ncore --data-dir {}/views.json"
-        " --data-factor 1 --init-type lidar --with-ut --with-eval3d  # gsplat"
-    )
     has_row_times = True
     needs_surfaces = True
-
-    points: PointCount = Field(
-        50000, description="Largest number of points, which are computed from depth."
-    )
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, KannalaBrandt | FTheta) and (miss := _miss(lens)) > _MOST_MISS:
@@ -177,15 +178,18 @@ class NCore(ForTraining):
     def joins(self, lens: Lens, other: Lens) -> bool:
         return True
 
-    def export(self, source: SourceDataset, folder: Path) -> None:
-        """Write a source's views into ``folder``."""
-        source = heads.by_camera(source)
-        streams = [_Stream.of(source, sensor, n) for n, sensor in enumerate(heads.sensors(source))]
-        if len(streams[0].frames) < 2:
-            raise UserError(
-                f"{source.lightfield.path}: frames: has one view; NCore needs two or more"
-            )
-        end = max(max(stream.frames[-1].poses) for stream in streams)
+    def write_sequence(
+        self,
+        streams: Sequence[Stream],
+        seen: Mapping[int, SourceDataset],
+        count: int,
+        folder: Path,
+    ) -> None:
+        """Write the ``streams`` into ``folder``, with ``count`` points of each of the ``seen``.
+
+        These are views by the time at which a lidar measures their points, in microseconds.
+        """
+        end = max(max(frame.poses) for stream in streams for frame in stream.frames)
         sequence = {
             "sequence_id": SEQUENCE,
             # The end is not included.
@@ -215,10 +219,12 @@ class NCore(ForTraining):
         store.group("cuboids/default/cuboids", {"cuboid_track_observations": []})
         _write_poses(store, streams)
         _write_lenses(store, streams)
-        _write_points(store, lift(source, count=self.points))
-        progress = Progress(len(source.lightfield.views), "ncore", "views")
+        store.group(_LIDAR_FRAMES, {"frames_timestamps_us": [[time, time] for time in seen]})
+        for time, source in seen.items():
+            _write_points(store, lift(source, count=count), time)
+        progress = Progress(sum(len(stream.frames) for stream in streams), self.name, "views")
         for stream in streams:
-            _write_frames(store, source, stream, progress)
+            _write_frames(store, stream, progress)
         digest = store.close()
         versions = {
             component: {
@@ -228,6 +234,32 @@ class NCore(ForTraining):
         }
         stores = [{"path": name, "md5": digest, "components": versions}]
         write_json(folder / f"{SEQUENCE}.json", sequence | {"component_stores": stores})
+
+
+class NCore(NCoreSequence):
+    """A sequence of NCore v4, for gsplat and 3DGRUT."""
+
+    name = "ncore"
+    summary = "NCore v4 for gsplat and 3DGRUT, also for fisheyes wider than 180°."
+    rank = 9
+    loader = (
+        "python simple_trainer.py mcmc --data-type ncore --data-dir {}/views.json"
+        " --data-factor 1 --init-type lidar --with-ut --with-eval3d  # gsplat"
+    )
+
+    points: PointCount = Field(
+        50000, description="Largest number of points, which are computed from depth."
+    )
+
+    def export(self, source: SourceDataset, folder: Path) -> None:
+        """Write a source's views into ``folder``."""
+        source = heads.by_camera(source)
+        streams = [Stream.of(source, sensor, n) for n, sensor in enumerate(heads.sensors(source))]
+        if len(streams[0].frames) < 2:
+            raise UserError(
+                f"{source.lightfield.path}: frames: has one view; NCore needs two or more"
+            )
+        self.write_sequence(streams, {0: source}, self.points, folder)
 
 
 def camera(lens: Lens, is_rolling: bool = False) -> dict[str, Any]:
@@ -335,14 +367,14 @@ def _ftheta(lens: FTheta) -> dict[str, Any]:
     }
 
 
-def _write_poses(store: ZarrStore, streams: Sequence[_Stream]) -> None:
+def _write_poses(store: ZarrStore, streams: Sequence[Stream]) -> None:
     lidar = {"pose": np.eye(4).tolist(), "dtype": "float64"}
     store.group("poses/default/static_poses", {str((_LIDAR, WORLD)): lidar})
     poses = {str((stream.name, WORLD)): _poses(stream.frames) for stream in streams}
     store.group("poses/default/dynamic_poses", poses)
 
 
-def _poses(frames: Sequence[_Frame]) -> dict[str, Any]:
+def _poses(frames: Sequence[Frame]) -> dict[str, Any]:
     """Return the poses of a camera by their times."""
     matrices = [matrix for frame in frames for matrix in frame.poses.values()]
     return {
@@ -352,7 +384,7 @@ def _poses(frames: Sequence[_Frame]) -> dict[str, Any]:
     }
 
 
-def _write_lenses(store: ZarrStore, streams: Sequence[_Stream]) -> None:
+def _write_lenses(store: ZarrStore, streams: Sequence[Stream]) -> None:
     store.group("intrinsics/default/cameras")
     for stream in streams:
         intrinsics = camera(stream.lens, stream.is_rolling)
@@ -364,22 +396,20 @@ def _write_lenses(store: ZarrStore, streams: Sequence[_Stream]) -> None:
         store.group(f"masks/default/cameras/{stream.name}", {"mask_names": []})
 
 
-def _write_points(store: ZarrStore, points: Points) -> None:
-    """Write the points as what a lidar at the origin measures at time 0."""
+def _write_points(store: ZarrStore, points: Points, time: int) -> None:
+    """Write the points as what a lidar at the origin measures at a ``time`` in microseconds."""
     count = len(points.positions)
     distances = np.linalg.norm(points.positions, axis=1)
     with np.errstate(invalid="ignore"):
         directions = points.positions / distances[:, None]
     directions[distances == 0] = [1, 0, 0]
-    frames = f"lidars/{_LIDAR}/frames"
-    store.group(frames, {"frames_timestamps_us": [[0, 0]]})
-    frame = f"{frames}/0"
+    frame = f"{_LIDAR_FRAMES}/{time}"
     store.group(frame)
     store.group(f"{frame}/generic_data", {})
     store.array(f"{frame}/generic_data/rgb", points.colours)
     store.group(f"{frame}/ray_bundle", {"n_rays": count})
     store.array(f"{frame}/ray_bundle/direction", directions.astype("<f4"))
-    store.array(f"{frame}/ray_bundle/timestamp_us", np.zeros(count, "<u8"))
+    store.array(f"{frame}/ray_bundle/timestamp_us", np.full(count, time, "<u8"))
     returns = f"{frame}/ray_bundle_returns"
     store.group(returns, {"n_returns": 1})
     store.array(f"{returns}/distance_m", distances.astype("<f4")[None])
@@ -389,9 +419,7 @@ def _write_points(store: ZarrStore, points: Points) -> None:
     store.array(f"{frame}/ray_bundle_returns_valid_mask_packed", is_valid, sizes)
 
 
-def _write_frames(
-    store: ZarrStore, source: SourceDataset, stream: _Stream, progress: Progress
-) -> None:
+def _write_frames(store: ZarrStore, stream: Stream, progress: Progress) -> None:
     folder = f"cameras/{stream.name}/frames"
     times = [[frame.start, frame.end] for frame in stream.frames]
     store.group(folder, {"frames_timestamps_us": times})
@@ -403,11 +431,11 @@ def _write_frames(
         if frame.exposure:
             about["exposure_us"] = list(frame.exposure)
         store.group(f"{place}/generic_data", about)
-        valid = source.valid(view)
+        valid = frame.source.valid(view)
         if not valid.all():
             store.array(f"{place}/generic_data/mask", valid.astype(np.uint8) * 255)
         # gsplat takes three channels.
         picture = store.folder / f"{view.name.replace('/', '_')}.png"
-        images.write_png(picture, source.opaque(view))
+        images.write_png(picture, frame.source.opaque(view))
         store.encoded(f"{place}/image", picture, {"format": "png"})
         progress.done()

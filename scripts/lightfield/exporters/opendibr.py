@@ -2,11 +2,13 @@
 
 Both are PNG (8 and 16 bit) or H.265 (10 and 12 bit, lossless). Depth is Z for perspective views and
 distance for fisheyes and panoramas. Poses are in OpenGL's axes, y up: world coordinates (x, y, z)
-are (x, z, −y) there. Source: OpenDIBR's ioHelper.h and vertex.fs.
+are (x, z, −y) there. A camera has one range of depth for all frames of a video. Source: OpenDIBR's
+ioHelper.h, NvDecoder.cpp and vertex.fs.
 """
 
 import math
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,10 +18,10 @@ from pydantic import Field
 from lightfield.core.files import write_json
 from lightfield.core.progress import Progress
 from lightfield.export import cameras, yuv
-from lightfield.export.disparity import FARTHEST, Farther, depth_range, levels
+from lightfield.export.disparity import FARTHEST, DisparityFrames, Farther
 from lightfield.export.source import Floats, SourceDataset
 from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, Developed, odd_size_refusal
-from lightfield.geometry.depth import conventional_depth
+from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.equirectangular import Equirectangular
@@ -28,22 +30,14 @@ from lightfield.geometry.rotations import matrix_to_euler
 from lightfield.imaging import images
 
 # Rows: the axes of OpenGL's world in ours.
-_TO_OPENGL = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-# Bits of colour and of depth.
-_BITS = {"png": (8, 16), "h265": (10, 12)}
+TO_OPENGL = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+# Suffix, bits of colour, and bits of depth.
+_PICTURES = {"png": (".png", 8, 16), "h265": (".mp4", 10, 12)}
+LOADER = "./RealtimeDIBR -i {} -j {}/cameras.json"
 
 
-class OpenDibr(Developed):
-    """The views and list that OpenDIBR plays."""
-
-    name = "opendibr"
-    summary = "Views for OpenDIBR."
-    rank = 5
-    loader = "./RealtimeDIBR -i {} -j {}/cameras.json"
-
-    format: Literal["png", "h265"] = Field(
-        "png", description="Form of the colour and disparity images. h265 needs ffmpeg."
-    )
+class OpenDibrViews(Developed):
+    """The options of exports that OpenDIBR plays."""
 
     def refusal(self, lens: Lens, has_depth: bool) -> str | None:
         if isinstance(lens, Equidistant):
@@ -51,59 +45,103 @@ class OpenDibr(Developed):
                 return "has its axis off centre, which OpenDIBR's fisheye cannot have"
         elif not isinstance(lens, Rectilinear | Equirectangular):
             return f"has a lens that OpenDIBR lacks; {TO_RECTILINEAR}, equidistant or a panorama"
-        if self.format == "h265" and shutil.which("ffmpeg") is None:
-            return "becomes H.265, for which ffmpeg must be installed; or give format: png"
-        refusal = odd_size_refusal(lens) if self.format == "h265" else None
-        return refusal or (None if has_depth else NO_DEPTH)
+        return None if has_depth else NO_DEPTH
 
-    def export(self, source: SourceDataset, folder: Path) -> None:
-        """Write a source's views into ``folder``."""
-        lens = source.lens
-        meaning = conventional_depth(lens)
-        colour_bits, depth_bits = _BITS[self.format]
-        suffix = ".png" if self.format == "png" else ".mp4"
-        views = source.lightfield.views
-        camera_entries: list[dict[str, Any]] = [viewport(source.lightfield.world_from_cameras)]
+    def write_views(
+        self,
+        frames: Sequence[SourceDataset],
+        pictures: Literal["png", "h265"],
+        folder: Path,
+        rate: float | None = None,
+    ) -> list[dict[str, Any]]:
+        """Write the views of the ``frames`` of still cameras into ``folder``. Return their entries.
+
+        Several frames must be H.265, with ``rate`` of them a second.
+        """
+        suffix, *bits = _PICTURES[pictures]
+        lightfield = frames[0].lightfield
+        camera_entries: list[dict[str, Any]] = [viewport(lightfield.world_from_cameras)]
         farther = Farther()
-        progress = Progress(len(views), "opendibr", "views")
-        for view in views:
-            depth = source.depth(view, meaning)
-            farther.count(depth)
-            limits = depth_range(depth)
-            disparity = levels(depth, limits, depth_bits, 0)
-            names = [f"{view.name}_{kind}{suffix}" for kind in ("texture", "depth")]
-            texture = folder / names[0]
-            depth_map = folder / names[1]
-            if self.format == "png":
-                source.write_image(view, texture)
-                images.write_png(depth_map, disparity)
+        progress = Progress(len(lightfield.views), self.name, "views")
+        for view in lightfield.views:
+            disparity = DisparityFrames(frames, view, farther)
+            texture, depth_map = (f"{view.name}_{kind}{suffix}" for kind in ("texture", "depth"))
+            if pictures == "png":
+                frames[0].write_image(view, folder / texture)
+                (levels,) = disparity.levels(bits[1], 0)
+                images.write_png(folder / depth_map, levels)
             else:
-                size = (lens.width, lens.height)
-                frame = yuv.of_colour(source.encoded(view), colour_bits)
-                yuv.write_hevc(texture, frame, size, colour_bits)
-                yuv.write_hevc(depth_map, yuv.of_levels(disparity, depth_bits), size, depth_bits)
+                _write_videos(frames, view, disparity, rate, folder / texture, folder / depth_map)
             camera_entries.append(
                 {
-                    "NameColor": names[0],
-                    "NameDepth": names[1],
+                    "NameColor": texture,
+                    "NameDepth": depth_map,
                     **pose(view.world_from_camera),
-                    "Depth_range": list(limits),
-                    "Resolution": [lens.width, lens.height],
-                    **projection(lens),
-                    "BitDepthColor": colour_bits,
-                    "BitDepthDepth": depth_bits,
+                    "Depth_range": list(disparity.limits),
+                    "Resolution": [lightfield.lens.width, lightfield.lens.height],
+                    **projection(lightfield.lens),
+                    "BitDepthColor": bits[0],
+                    "BitDepthDepth": bits[1],
                 }
             )
             progress.done()
         farther.report(folder)
         write_json(folder / "cameras.json", {"Axial_system": "OPENGL", "cameras": camera_entries})
+        return camera_entries[1:]
+
+
+class OpenDibr(OpenDibrViews):
+    """The views and list that OpenDIBR plays."""
+
+    name = "opendibr"
+    summary = "Views for OpenDIBR."
+    rank = 5
+    loader = LOADER
+
+    format: Literal["png", "h265"] = Field(
+        "png", description="Form of the colour and disparity images. h265 needs ffmpeg."
+    )
+
+    def refusal(self, lens: Lens, has_depth: bool) -> str | None:
+        refusal = super().refusal(lens, has_depth)
+        if self.format == "png" or refusal:
+            return refusal
+        return odd_size_refusal(lens) or hevc_refusal("; or give format: png")
+
+    def export(self, source: SourceDataset, folder: Path) -> None:
+        """Write a source's views into ``folder``."""
+        self.write_views([source], self.format, folder)
+
+
+def hevc_refusal(remedy: str = "") -> str | None:
+    """Return why no H.265 can be written, with another ``remedy``. None if it can."""
+    if shutil.which("ffmpeg") is None:
+        return f"becomes H.265, for which ffmpeg must be installed{remedy}"
+    return None
+
+
+def _write_videos(
+    frames: Sequence[SourceDataset],
+    view: View,
+    disparity: DisparityFrames,
+    rate: float | None,
+    texture: Path,
+    depth_map: Path,
+) -> None:
+    """Write the colour and the disparity of a view in all ``frames`` as H.265."""
+    _, colour_bits, depth_bits = _PICTURES["h265"]
+    size = (frames[0].lens.width, frames[0].lens.height)
+    colours = (yuv.of_colour(frame.encoded(view), colour_bits) for frame in frames)
+    yuv.write_hevc(texture, colours, size, colour_bits, rate)
+    depths = (yuv.of_levels(levels, depth_bits) for levels in disparity.levels(depth_bits, 0))
+    yuv.write_hevc(depth_map, depths, size, depth_bits, rate)
 
 
 def pose(world_from_camera: Floats) -> dict[str, list[float]]:
     """Return the keys of a camera-to-world matrix (4, 4): metres, and XYZ Euler degrees."""
-    angles = matrix_to_euler(_TO_OPENGL @ world_from_camera[:3, :3])
+    angles = matrix_to_euler(TO_OPENGL @ world_from_camera[:3, :3])
     return {
-        "Position": (_TO_OPENGL @ world_from_camera[:3, 3]).tolist(),
+        "Position": (TO_OPENGL @ world_from_camera[:3, 3]).tolist(),
         "Rotation": np.degrees(angles).tolist(),
     }
 

@@ -13,24 +13,20 @@ its shape by its name. The key last_modified is left out, so that equal views gi
 Sources: MapAnything's data_processing/README.md, utils/wai and datasets/wai.
 """
 
-import io
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from lightfield.core.files import absolute_path, write_bytes, write_json
 from lightfield.export import cameras, covisibility, heads
-from lightfield.export.pictures import write_pictures
+from lightfield.export.pictures import write_pictures, write_z
 from lightfield.export.source import SourceDataset
 from lightfield.exporters.base import NO_DEPTH, TO_RECTILINEAR, Developed, Joined
+from lightfield.formats import npz
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.imaging import images
 
-# From the axes of Blender's camera (y up, looks along −z) to OpenCV's (y down, looks along z).
-_FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 _MODALITIES = {
     "image": {"frame_key": "image", "format": "image"},
     "depth": {"frame_key": "depth", "format": "depth"},
@@ -70,7 +66,7 @@ class Wai(Joined, Developed):
             mask="masks/{}.png",
             write=lambda view, path: images.write_png(path, source.opaque(view)),
         ):
-            _write_depth(source, view, folder)
+            write_z(source, view, folder / "depth" / f"{view.name}.exr")
             frames.append(_frame(source, view, has_mask))
         path = _write_covisibility(source, folder)
         content = {
@@ -102,7 +98,7 @@ def _frame(source: SourceDataset, view: View, has_mask: bool) -> dict[str, Any]:
         "image": image,
         "depth": f"depth/{view.name}.exr",
         **({"mask_path": f"masks/{view.name}.png"} if has_mask else {}),
-        "transform_matrix": (view.world_from_camera @ _FLIP).tolist(),
+        "transform_matrix": cameras.opencv_matrix(view).tolist(),
         **_intrinsics(source.view(view).lens),
     }
 
@@ -110,23 +106,13 @@ def _frame(source: SourceDataset, view: View, has_mask: bool) -> dict[str, Any]:
 def _intrinsics(lens: Lens) -> dict[str, float]:
     """Return the keys of a lens, in pixels. The first pixel's centre is at (0, 0)."""
     assert isinstance(lens, Rectilinear)
-    fx, fy = cameras.focal_pixels(lens)
-    cx, cy = (middle - 0.5 for middle in lens.center)
+    fx, fy, cx, cy = cameras.opencv_pinhole(lens)
     return {"fl_x": fx, "fl_y": fy, "cx": cx, "cy": cy, "w": lens.width, "h": lens.height}
-
-
-def _write_depth(source: SourceDataset, view: View, folder: Path) -> None:
-    """Write a view's Z. OpenCV reads one channel named Y as a plane (h, w)."""
-    depth = source.depth(view, "z")
-    known = np.where(np.isfinite(depth), depth, 0).astype(np.float32)
-    images.write_exr(folder / "depth" / f"{view.name}.exr", {"Y": known})
 
 
 def _write_covisibility(source: SourceDataset, folder: Path) -> str:
     """Write the shares of pixels that views see of each other. Return the file's path."""
     shares = covisibility.shares(source)
     path = f"covisibility/v0/pairwise_covisibility--{len(shares)}x{len(shares)}.npy"
-    content = io.BytesIO()
-    np.save(content, shares)
-    write_bytes(folder / path, content.getvalue())
+    write_bytes(folder / path, npz.npy(shares))
     return path

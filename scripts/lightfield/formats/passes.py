@@ -21,6 +21,11 @@ GROUP_PREFIX = "Combined_"
 AOV_PREFIX = "plenoforge_"
 INEXACT = f"{AOV_PREFIX}inexact"
 
+# The estimated variance of a pixel's colour. Half floats would lose small values.
+VARIANCE = "variance"
+# It is estimated from so many parts of the samples, each rendered by itself.
+SAMPLE_PARTS = 8
+
 # The JSON beside images of ids, which maps names to ids.
 NAMES = "names.json"
 
@@ -33,17 +38,18 @@ class Pass:
 
     - "light" and "value": as colour;
     - "normal": as colour, and scaled to a unit vector again;
-    - "id" and "matte": the value of the source pixel that the ray falls in;
+    - "id", "matte" and "variance": the value of the source pixel that the ray falls in;
     - "motion" and "flow": not at all, because they are in pixels of their own lens.
 
     Its values are the sum of the Cycles passes ``cycles``. If it has them, this sum is multiplied
     by the Cycles pass ``factor``, and the Cycles pass ``without`` is subtracted. Values are 0 where
     the Cycles pass ``unless`` is not. A matte holds them side by side. Light, values and mattes are
-    means over all samples. Other passes describe the surface at the pixel's centre, as depth does.
+    means over all samples, and the variance is the variance of such a mean. Other passes describe
+    the surface at the pixel's centre, as depth does.
     """
 
     name: str
-    kind: Literal["light", "value", "matte", "normal", "id", "motion", "flow"]
+    kind: Literal["light", "value", "matte", "variance", "normal", "id", "motion", "flow"]
     channels: tuple[str, ...]
     dtype: str
     meaning: str
@@ -54,8 +60,8 @@ class Pass:
 
     @property
     def of_colour(self) -> bool:
-        """Whether it is a mean over all samples, and does not describe the pixel's centre."""
-        return self.kind in ("light", "value", "matte")
+        """Whether it follows from all samples, and does not describe the pixel's centre."""
+        return self.kind in ("light", "value", "matte", "variance")
 
     @property
     def needed(self) -> tuple[str, ...]:
@@ -145,6 +151,14 @@ _ALL_PASSES = (
         "where the surface is in the previous and in the next frame, in pixels from here, "
         "x to the right and y down",
         ("Vector",),
+    ),
+    Pass(
+        VARIANCE,
+        "variance",
+        ("R", "G", "B"),
+        "float32",
+        "estimated variance of the colour, in squared linear light",
+        (),
     ),
     _light("albedo", "diffuse reflectance; black on metal and glass", "Diffuse Color"),
     _scattered("diffuse"),

@@ -18,9 +18,9 @@ from pydantic import (
 )
 
 from lightfield.formats import light_groups, passes
-from lightfield.formats.passes import PASSES, Pass
+from lightfield.formats.passes import PASSES, SAMPLE_PARTS, VARIANCE, Pass
 from lightfield.settings.base import AS_WRITTEN, Settings, Vector, checked
-from lightfield.settings.types import AtLeastOne, DenoisePrefilter, unique_names
+from lightfield.settings.types import AtLeastOne, Compression, DenoisePrefilter, unique_names
 
 _PassNames = Annotated[
     list[Annotated[str, Field(json_schema_extra={"enum": list(PASSES)})]],
@@ -182,7 +182,7 @@ class RenderOptions(Settings):
         "significant bits (a relative error below 1e-5), in smaller files. half: 11 significant "
         "bits.",
     )
-    compression: Literal["zip", "zips", "piz", "htj2k", "zstd"] | None = Field(
+    compression: Compression | None = Field(
         None,
         description="Lossless compression of the views' EXR files. The default is zip, which every "
         "program reads. htj2k and zstd give smaller files, for archives and temporary use.",
@@ -201,6 +201,16 @@ class RenderOptions(Settings):
         "passes of their own. each: all of them. A list: the sources with these names. A mapping: "
         "groups of them. All others form the group rest.",
     )
+
+    @property
+    def has_variance(self) -> bool:
+        """Whether the views have a pass of their variance, so that they must have no bias."""
+        return VARIANCE in (self.passes or ())
+
+    @property
+    def fewest_samples(self) -> int:
+        """The fewest samples that a pixel may have."""
+        return SAMPLE_PARTS if self.has_variance else 1
 
 
 class RenderBlock(RenderOptions):

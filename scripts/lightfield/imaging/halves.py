@@ -23,11 +23,9 @@ def widen(red: Array, green: Array, blue: Array, alpha: Array | None = None) -> 
     return out
 
 
-def narrow(pixels: Array, count: int) -> Array:
-    """Return the first ``count`` channels of (h, w, 4) float32 pixels as half, (count, h, w)."""
-    out = np.empty((count, *pixels.shape[:2]), np.float16)
+def narrow(pixels: Array, out: Array) -> None:
+    """Write the first n channels of (h, w, 4) float32 pixels into ``out``, (n, h, w) half."""
     _narrow(pixels, out.view(np.uint16))
-    return out
 
 
 def to_half(values: Array) -> Array:
@@ -56,8 +54,8 @@ def _to_half(values: Array, out: Array) -> None:
 @kernel  # four times as fast as numpy
 def _narrow(values: Array, out: Array) -> None:
     for i in range(values.shape[0]):
-        for j in range(values.shape[1]):
-            for c in range(out.shape[0]):
+        for c in range(out.shape[0]):
+            for j in range(values.shape[1]):
                 # A filter may overshoot the half range. Clamp, so that no value becomes infinite.
                 value = min(max(values[i, j, c], -np.float32(HALF_MAX)), np.float32(HALF_MAX))
                 out[c, i, j] = _float_to_half(value)

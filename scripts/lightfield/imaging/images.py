@@ -6,6 +6,7 @@ takes 33 MB of memory. Both are imported only for a file that needs them: scene 
 with exporters, which import this module.
 """
 
+import ctypes
 import re
 import struct
 import zlib
@@ -20,6 +21,7 @@ from lightfield.core.errors import UserError
 from lightfield.core.files import atomic_path, check_readable, open_file
 from lightfield.imaging.alpha import divisor
 from lightfield.imaging.primaries import Chromaticities, to_rec_709
+from lightfield.settings.types import Compression
 
 Attribute = str | int | float
 
@@ -50,7 +52,7 @@ HALF_MAX = 65504.0
 _LARGEST_SIDE = 65536
 
 # OpenEXR's codecs that keep every bit of halves and floats.
-CODECS = {
+CODECS: dict[Compression, str] = {
     "zip": "ZIP_COMPRESSION",
     "zips": "ZIPS_COMPRESSION",
     "piz": "PIZ_COMPRESSION",
@@ -297,15 +299,15 @@ def is_finished(path: Path, key: str) -> bool:
         return False
 
 
-def check_codec(compression: str) -> None:
-    """Raise `UserError` if this version of OpenEXR cannot write one of `CODECS`."""
+def check_codec(key: str, compression: Compression) -> None:
+    """Raise `UserError`, which names the ``key``, if this version of OpenEXR lacks a codec."""
     import OpenEXR
 
     if not hasattr(OpenEXR, CODECS[compression]):
         writable = ", ".join(name for name, codec in CODECS.items() if hasattr(OpenEXR, codec))
         raise UserError(
-            f"render.compression: is {compression!r}, which OpenEXR {OpenEXR.__version__} cannot "
-            f"write; must be one of {writable}"
+            f"{key}: is {compression!r}, which OpenEXR {OpenEXR.__version__} cannot write; "
+            f"must be one of {writable}"
         )
 
 
@@ -313,18 +315,22 @@ def write_exr(
     path: Path | str,
     channels: Mapping[str, np.ndarray[Any, Any]],
     attributes: Mapping[str, Attribute] | None = None,
-    compression: str = "zip",
+    compression: Compression = "zip",
     chromaticities: Chromaticities | None = None,
+    level: int = 4,
 ) -> None:
     """Write (height, width) arrays as one EXR part: float16 as half, float32 as float.
 
-    ``chromaticities`` name the colour space. Without them, readers take it for Rec. 709.
+    ``chromaticities`` name the colour space. Without them, readers take it for Rec. 709. ``level``
+    is the effort of zip and zips, 1 to 9. All threads of a process must use the same.
 
     Lossless (one of `CODECS`), atomic, and without time stamp or host name, so that equal input
     gives equal bytes. Raises `UserError` if the file cannot be written.
     """
     import OpenEXR
 
+    # The package cannot set a file's own level.
+    ctypes.CDLL(OpenEXR.__file__).exr_set_default_zip_compression_level(level)
     header = {"compression": getattr(OpenEXR, CODECS[compression]), "type": OpenEXR.scanlineimage}
     if chromaticities:
         header[_CHROMATICITIES] = chromaticities

@@ -1,12 +1,10 @@
 """Writes pictures as a video, with ffmpeg."""
 
-import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from lightfield.core.errors import UserError
-from lightfield.core.files import atomic_path
+from lightfield.imaging.ffmpeg import encoding
 from lightfield.imaging.pictures import Array
 
 # H.264 codes 2 × 2 pixels at once.
@@ -32,37 +30,9 @@ def video(
     file appears when the block ends without an error. Raises `UserError` if ffmpeg is missing, or
     cannot write the file.
     """
-    command = ["ffmpeg", "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    command += ["-s", f"{size[0]}x{size[1]}", "-r", str(rate), "-i", "-"]
-    command += ["-vf", f"{_EVEN},{_MATRIX},{_TAGS}", "-c:v", "libx264"]
-    command += ["-crf", str(rate_factor)]
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(rate)]
+    options = ["-vf", f"{_EVEN},{_MATRIX},{_TAGS}", "-c:v", "libx264", "-crf", str(rate_factor)]
     if is_reproducible:
-        command += ["-threads", "1", "-bitexact"]
-    command += ["-f", "mp4"]
-    with atomic_path(path) as temporary:
-        try:
-            ffmpeg = subprocess.Popen(
-                [*command, str(temporary)], stdin=subprocess.PIPE, stderr=subprocess.PIPE
-            )
-        except FileNotFoundError:
-            raise UserError(f"{path}: a video needs ffmpeg, which is not installed") from None
-
-        def finish() -> None:
-            _, messages = ffmpeg.communicate()
-            if ffmpeg.returncode:
-                problem = " ".join(messages.decode(errors="replace").split())
-                raise UserError(f"{path}: ffmpeg cannot write it: {problem}")
-
-        def add(picture: Array) -> None:
-            assert ffmpeg.stdin
-            try:
-                ffmpeg.stdin.write(picture.tobytes())
-            except BrokenPipeError:
-                finish()
-
-        try:
-            yield add
-            finish()
-        finally:
-            ffmpeg.kill()
-            ffmpeg.wait()
+        options += ["-threads", "1", "-bitexact"]
+    with encoding(path, [*raw, "-i", "-", *options, "-f", "mp4"]) as add:
+        yield lambda picture: add(picture.tobytes())

@@ -3,8 +3,7 @@
 A render is ``<view>.png``, sRGB, or ``<view>.exr``, linear, with the dataset's kind of depth in
 channel Z. Normals are ``normal/<view>.exr``, like the dataset's pass. The rig's name may precede
 the view's, as in exports of several rigs: ``spiral_view_0000f.png``. The developed pictures are
-compared. Pictures with alpha are composited over a background. LPIPS is missing, because no package
-of this environment holds the weights of its network.
+compared. Pictures with alpha are composited over a background.
 """
 
 import re
@@ -30,6 +29,7 @@ from lightfield.geometry.visibility import ONE_SURFACE
 from lightfield.imaging import images
 from lightfield.imaging.alpha import divisor
 from lightfield.imaging.tonemap import decode_srgb, encode_srgb, to_16_bit, tone_map
+from lightfield.measurement.lpips import Lpips
 from lightfield.measurement.picture_difference import (
     depth_error,
     flip_map,
@@ -318,14 +318,19 @@ def regions(
 
 
 def errors(
-    shown: Pictures, true: Pictures, parts: Mapping[str, Bools], lens: Lens
+    shown: Pictures,
+    true: Pictures,
+    parts: Mapping[str, Bools],
+    lens: Lens,
+    network: Lpips | None = None,
 ) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the errors of each region: means over its pixels, None without depth or normals.
 
-    They are psnr in decibel, ws_psnr, iv_psnr, ssim and flip. Equal pictures have inf, 100, 100, 1
-    and 0. Depth is as in `depth_error`, and normal as in `normal_error`.
-    Only the region "all" has iv_psnr, because a match may lie in another region. Outside the region
-    "all" both pictures count as black.
+    They are psnr in decibel, ws_psnr, iv_psnr, ssim, flip and lpips. Equal pictures have inf, 100,
+    100, 1, 0 and 0. Depth is as in `depth_error`, and normal as in `normal_error`.
+    Only the region "all" has iv_psnr, because a match may lie in another region, and lpips, of the
+    whole picture. lpips is None without a ``network``. Outside the region "all" both pictures count
+    as black.
     """
     compared = parts["all"][..., np.newaxis]
     true_colour = np.where(compared, true.colour, 0)
@@ -349,6 +354,9 @@ def errors(
                 else None,
                 "ssim": float(similarity[region].mean()),
                 "flip": float(flip[region].mean()),
+                "lpips": network.distance(true_colour, shown_colour)
+                if network and name == "all"
+                else None,
                 "depth": None
                 if shown.depth is None or true.depth is None
                 else depth_error(shown.depth[region], true.depth[region]),

@@ -315,12 +315,13 @@ def _limited_render(render: Render | None, rig: Rig, limits: Preset) -> RenderBl
         # The calibration chooses these.
         for key in CALIBRATED_KEYS:
             content.pop(key, None)
+    most_samples = limits.samples and max(limits.samples, render.fewest_samples)
     if isinstance(render.samples, int):
-        content["samples"] = min(render.samples, limits.samples or render.samples)
-    elif limits.samples:
-        content["most_samples"] = limits.samples
-    # The light groups would no longer add up to the colour.
-    if limits.denoise is not None and render.light_groups is None:
+        content["samples"] = min(render.samples, most_samples or render.samples)
+    elif most_samples:
+        content["most_samples"] = most_samples
+    # The light groups would no longer add up to the colour, and its variance would not be known.
+    if limits.denoise is not None and render.light_groups is None and not render.has_variance:
         content["denoise"] = limits.denoise
     if limits.denoise_prefilter and content.get("denoise"):
         content.setdefault("denoise_prefilter", limits.denoise_prefilter)

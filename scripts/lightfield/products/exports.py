@@ -47,8 +47,8 @@ def run(source: Source, options: Export, folder: Path) -> None:
         options.export(source, folder)
         return
     facts: dict[str, Any] = {"look": source.look.to_json()} if source.look else {}
-    sizes = {(lens.width, lens.height) for lens in source.lenses}
-    if len(sizes) > 1:
+    sizes = options.picture_sizes(source)
+    if sizes != {(source.lens.width, source.lens.height)}:
         facts[SIZES] = sorted(sizes)
     place = source.dataset / source.name / list_path(options.name)
     replace_folder(

@@ -24,6 +24,7 @@ from lightfield.geometry.frames import ONE_PLACE
 from lightfield.geometry.overview import middle_view
 from lightfield.imaging import images
 from lightfield.imaging.blender_looks import FILE_LOOK, title
+from lightfield.measurement.noise import relative_error
 from lightfield.reading.dataset import OpenDataset
 from lightfield.report import contact_sheet, faults, page, pass_pictures, snippet, tables, views
 from lightfield.report.packing import webp
@@ -70,7 +71,7 @@ def write(job: ReportHtml) -> None:
         "page.html.j2",
         name=name,
         home="../" * (name.count("/") + 2) + "index.html",
-        facts=facts(folder, lightfield, rig, packed.missed),
+        facts=facts(folder, dataset, rig, packed.missed),
         middle=None if job.settings.panorama else middle.name,
         passes_of=middle.name,
         pictures={stem: page.photo(report / f"{stem}.png", WIDEST) for stem in PICTURES},
@@ -177,14 +178,16 @@ def _unreadable(validation: Mapping[str, Any] | None) -> set[str]:
 
 
 def facts(
-    folder: Path, lightfield: LightField, rig: rigs.Rig, missed: float | None
+    folder: Path, dataset: OpenDataset, rig: rigs.Rig, missed: float | None
 ) -> list[tuple[str, str]]:
     """Return the most important facts about a dataset, as pairs of title and text.
 
     ``missed`` is the part of the depths that are inf.
     """
+    lightfield = dataset.lightfield
     lens = lightfield.lens
     render = lightfield.render
+    noise = relative_error(dataset.views) if render.has_variance else None
     parts = [view.split for view in lightfield.views]
     counts = [f"{parts.count(part)} {part}" for part in dict.fromkeys(parts) if part]
     # Imported views have no known samples.
@@ -204,6 +207,7 @@ def facts(
         "Resolution": f"{lens.width} × {lens.height}",
         "Frame": str(lightfield.frame),
         "Samples": samples,
+        "Noise": noise and f"relative mean squared error {noise:.2g}, by the views' variance",
         "Depth": DEPTHS.get(lightfield.depth or "", "none"),
         "Pixels without a hit": None if missed is None else f"{100 * missed:.3g} %",
         "Size of the views": units.size(sum(path.stat().st_size for path in exrs)),

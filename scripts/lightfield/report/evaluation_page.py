@@ -17,8 +17,9 @@ from lightfield.export.trainer_splits import splits
 from lightfield.formats import gaussians
 from lightfield.formats.lightfield import View
 from lightfield.imaging import images
-from lightfield.measurement import evaluation
+from lightfield.measurement import evaluation, lpips
 from lightfield.measurement.evaluation import ShownRender
+from lightfield.measurement.lpips import Lpips
 from lightfield.measurement.picture_difference import flip_map
 from lightfield.report import page
 from lightfield.stages.measurement import Evaluate, EvaluationSettings
@@ -34,15 +35,21 @@ def evaluate(job: Evaluate) -> None:
     views = source.lightfield.views
     tests = [view for view in views if view.split == "test"] or splits(source.lightfield).test
     background = np.array(list(bytes.fromhex(job.settings.background))) / 255
+    network = lpips.read(job.lpips_weights) if job.lpips_weights else None
     job.output.parent.mkdir(parents=True, exist_ok=True)
     with temporary_folder(job.output.parent) as temporary:
-        overall = write(temporary, source, tests, job.renders, job.masks, background)
+        overall = write(temporary, source, tests, job.renders, job.masks, background, network)
         _move_files(temporary, job.output)
     views_compared = "1 view" if len(tests) == 1 else f"{len(tests)} views"
     print(
         f"{views_compared}: PSNR {overall['psnr']:.2f} dB, WS-PSNR {overall['ws_psnr']:.2f} dB, "
         f"IV-PSNR {overall['iv_psnr']:.2f} dB, SSIM {overall['ssim']:.4f}, "
-        f"FLIP {overall['flip']:.4f}; LPIPS is left out: no installed package has its weights"
+        f"FLIP {overall['flip']:.4f}, "
+        + (
+            f"LPIPS ({network.net}) {overall['lpips']:.4f}"
+            if network
+            else "no LPIPS without --lpips-weights (see docs/how-to/evaluate-renders.md)"
+        )
     )
 
 
@@ -75,13 +82,14 @@ def write(
     renders: Path,
     masks: Path | None,
     background: Floats,
+    network: Lpips | None,
 ) -> dict[str, Any]:
     """Write the table, the page and the pictures of the test views. Return the means over all.
 
     Pictures with alpha are composited over ``background`` (3,) in sRGB, 0 to 1. Warns about renders
     whose alpha or background differs from the truth's. Raises `UserError` for a render that is
     missing in the folder ``renders``, or that cannot be compared. ``renders`` may be the PLY of a
-    Gaussian splat, which is drawn.
+    Gaussian splat, which is drawn. The ``network`` gives LPIPS.
     """
     read = _reader(renders, source, tests, background)
     rows: list[dict[str, Any]] = []
@@ -91,7 +99,7 @@ def write(
         mask = evaluation.find(masks, source, view, [".png"]) if masks else None
         picture = output / "pictures" / f"{view.name}.png"
         render = read(view)
-        errors, problem = _compare(view, render, source, mask, background, picture)
+        errors, problem = _compare(view, render, source, mask, background, picture, network)
         rows += errors
         if problem:
             problems.append(f"{render.name}: {problem}")
@@ -109,6 +117,8 @@ def write(
         means=means,
         rows=rows,
         background=evaluation.hexadecimal(background),
+        network=network.net if network else None,
+        recipe=lpips.RECIPE,
         problems=[problem.removeprefix(f"{renders}/") for problem in problems],
         pictures={
             view.name: page.photo(output / "pictures" / f"{view.name}.png", WIDEST)
@@ -136,6 +146,7 @@ def _compare(
     mask: Path | None,
     background: Floats,
     picture: Path,
+    network: Lpips | None,
 ) -> tuple[list[dict[str, Any]], str | None]:
     """Return a row of errors for each region of a ``render``, and a warning or None.
 
@@ -153,7 +164,7 @@ def _compare(
         raise UserError(f"{render.name}: has colour that is not a number where it is compared")
     rows = [
         {"view": view.name, "region": region, **errors}
-        for region, errors in evaluation.errors(shown, true, regions, source.lens)
+        for region, errors in evaluation.errors(shown, true, regions, source.lens, network)
     ]
     pictures = [np.nan_to_num(image.colour) for image in (true, shown)]
     flip = flip_map(*pictures)[..., np.newaxis].repeat(3, axis=-1)

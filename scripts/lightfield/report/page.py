@@ -54,8 +54,11 @@ def environment() -> jinja2.Environment:
     # A page has the modules that they share only once.
     only_of_walk = [module for module in walk_modules if module not in page_modules]
     only_of_relight = [module for module in relight_modules if module not in page_modules]
+    focus_modules = script_modules(TEMPLATES / "focus/main.js")
+    only_of_focus = [module for module in focus_modules if module not in page_modules]
     environment.globals |= {
         "corpus_js": Markup(joined_script(script_modules(TEMPLATES / "corpus/main.js"))),
+        "focus_js": Markup(joined_script(only_of_focus)),
         "index_js": Markup(joined_script(script_modules(TEMPLATES / "index/main.js"))),
         "page_css": Markup((TEMPLATES / "page.css").read_text("utf-8")),
         "page_js": Markup(joined_script(page_modules)),

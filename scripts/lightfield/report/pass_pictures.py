@@ -88,6 +88,8 @@ def _picture(view_pass: Pass, pixels: Array, exposure: float, look: Look | None)
             return to_8_bit(np.ascontiguousarray(pixels, np.float32))
         case "light":
             return pictures.develop(pixels.astype(np.float32), exposure, look)
+        case "variance":
+            return pictures.develop(np.sqrt(pixels), exposure, look)
         case "value":
             colours = np.repeat(pixels.astype(np.float32), 3, axis=-1)
         case "normal":

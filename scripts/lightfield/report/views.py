@@ -22,7 +22,7 @@ from lightfield.imaging import images, pictures
 from lightfield.imaging.look import Look
 from lightfield.imaging.noise import relative_noise
 from lightfield.reading.dataset import OpenDataset, OpenView
-from lightfield.report import epipolar, walk
+from lightfield.report import epipolar, focus, walk
 from lightfield.report.packing import (
     DEPTH_STEPS,
     depth_range,
@@ -141,6 +141,8 @@ def collect(
         "row": _epipolar_images(load, lightfield, row, row_views, shown["light"]) if row else None,
         **shown,
     }
+    if refocused := _refocused(rig, lightfield, small, views, depths, embedded, unreadable, shown):
+        data["focus"] = refocused
     noises = [view.noise for view in views if math.isfinite(view.noise)]
     return _PackedViews(
         data=data,
@@ -263,6 +265,30 @@ def _pictures(
             fills_holes=not lightfield.transparent,
         ),
     }
+
+
+def _refocused(
+    rig: Rig,
+    lightfield: LightField,
+    small: Lens,
+    views: list[PageView],
+    depths: Array | None,
+    embedded: list[int],
+    unreadable: Collection[str],
+    shown: dict[str, Any],
+) -> dict[str, Any] | None:
+    """Return the pictures of the slider of the focus. None if the rig is no plane with depth."""
+    grid = focus.plane_of(rig, lightfield.world_from_cameras)
+    if grid is None or depths is None:
+        return None
+    readable = [
+        (number, view.colour)
+        for number, view in zip(embedded, views, strict=True)
+        if lightfield.views[number].name not in unreadable
+    ]
+    z = converted(depths, small.pixel_rays(), lightfield.depth, "z")
+    numbers, colours = [number for number, _ in readable], [colour for _, colour in readable]
+    return focus.collect(grid, small, colours, numbers, z, shown["light"])
 
 
 def _missed(depths: Array) -> float | None:

@@ -22,7 +22,9 @@ from lightfield.geometry.lenses import Array, Lens
 from lightfield.geometry.lenses.cube_map import CUBE_FACES, CubeMap
 from lightfield.geometry.rotations import matrix_to_euler
 from lightfield.imaging.blender_looks import FILE_LOOK
+from lightfield.imaging.images import Attribute, check_codec, write_exr
 from lightfield.imaging.look import Look
+from lightfield.imaging.primaries import Chromaticities
 from lightfield.imaging.sensor import SensorParameters
 from lightfield.reprojection import lens_map
 from lightfield.reprojection.geometry import ReprojectionGeometry, Target
@@ -31,6 +33,9 @@ from lightfield.reprojection.sensor import parameters_of
 from lightfield.stages.lenses import Reproject
 
 SUFFIXES = (".exr", ".png", ".jpg", ".jpeg")
+
+# The effort of zip. OpenEXR's default, 4, takes a third longer. Its files are 0 to 5 % smaller.
+_LEVEL = 1
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,8 @@ class ReprojectionJob:
         if not settings.formats:
             raise UserError("--settings: formats: must be a list of exr, png, or both")
         self.settings = settings
+        if settings.compression:
+            check_codec("compression", settings.compression)
         self.lightfield, self.source = stage.read()
         self.geometry = ReprojectionGeometry.of(settings, self.source)
         self.targets = self.geometry.targets
@@ -192,9 +199,11 @@ class ReprojectionJob:
             "depth": self.lightfield.content.get("depth"),
             "source": identity,
         }
-        # False is left out, so that the keys of earlier versions stay valid.
+        # Defaults are left out, so that the keys of earlier versions stay valid.
         if self.lightfield.transparent:
             content["transparent"] = True
+        if self.settings.compression:
+            content["compression"] = self.settings.compression
         if light.weights is not None:
             content["light"] = light.weights
         if any(map(passes.is_group, self.passes)):
@@ -202,6 +211,17 @@ class ReprojectionJob:
         if parameters := self.sensor_parameters(view, target):
             content["sensor"] = parameters.to_json()
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    def write_exr(
+        self,
+        path: Path,
+        channels: Mapping[str, Array],
+        attributes: Mapping[str, Attribute],
+        chromaticities: Chromaticities | None = None,
+    ) -> None:
+        """Write (H, W) arrays as an EXR, with the compression of the settings."""
+        compression = self.settings.compression or "zip"
+        write_exr(path, channels, attributes, compression, chromaticities, _LEVEL)
 
     def outputs(self, view: SourceView, target: Target, light: Light) -> dict[str, Path]:
         """Return the files of a view's image, by kind."""

@@ -15,6 +15,13 @@ import numpy as np
 from lightfield.core.compiled import inline, kernel, part
 from lightfield.geometry.lenses import Array
 
+# isort: split
+# After `compiled`, which keeps from numba what could change a kernel, and what it need not import.
+from llvmlite import ir  # type: ignore[import-untyped]
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic, models, register_model
+
 # The flags of samples.
 NOTHING = 0  # The source does not see the ray.
 INSIDE = 1  # Every source pixel that the filter reads exists.
@@ -22,6 +29,125 @@ CAREFUL = 2  # Some may be missing: at the image's edge, seam or pole, or the im
 
 Weights = Callable[[Any], tuple[Any, ...]]
 Topology = tuple[bool, bool, bool]
+
+
+class _Pixel(types.Type):  # type: ignore[misc]
+    """The type of a pixel's four channels in one register, with which kernels compute at once.
+
+    Compilers see only sometimes that they could do so.
+    """
+
+    def __init__(self, channel: Any) -> None:
+        super().__init__(f"pixel of {channel}")
+        self.channel = channel
+
+
+@register_model(_Pixel)
+class _PixelModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _vector(kind))
+
+
+# As in `compiled`.
+_FLAGS = ("contract", "nsz")
+
+
+def _vector(kind: Any) -> Any:
+    channel = ir.FloatType() if kind.channel == types.float32 else ir.DoubleType()
+    return ir.VectorType(channel, 4)
+
+
+def _spread(builder: Any, value: Any) -> Any:
+    """Return a register with one value in all four channels."""
+    pixel = ir.Constant(ir.VectorType(value.type, 4), ir.Undefined)
+    for channel in range(4):
+        pixel = builder.insert_element(pixel, value, ir.IntType(32)(channel))
+    return pixel
+
+
+def _place(context: Any, builder: Any, kinds: Any, array: Any, index: Any) -> Any:
+    """Return the pointer to the pixel at an index of a contiguous array (..., 4) float32."""
+    kind, index_kinds = kinds[:2]
+    indices = [
+        context.cast(builder, value, index_kind, types.intp)
+        for value, index_kind in zip(cgutils.unpack_tuple(builder, index), index_kinds, strict=True)
+    ]
+    indices.append(context.get_constant(types.intp, 0))
+    content = context.make_array(kind)(context, builder, array)
+    place = cgutils.get_item_pointer(context, builder, kind, content, indices)
+    return builder.bitcast(place, _vector(_Pixel(types.float32)).as_pointer())
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _load(typing: Any, array: Any, index: Any) -> Any:
+    """Return the pixel at an ``index`` of a contiguous array (..., 4) float32."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.load(_place(context, builder, signature.args, *arguments), align=4)
+
+    return _Pixel(types.float32)(array, index), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _store(typing: Any, array: Any, index: Any, pixel: Any) -> Any:
+    """Write a pixel to an ``index`` of a contiguous array (..., 4) float32."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = _place(context, builder, signature.args, *arguments[:2])
+        value = arguments[2]
+        if pixel.channel == types.float64:
+            value = builder.fptrunc(value, place.type.pointee)
+        builder.store(value, place, align=4)
+        return context.get_dummy_value()
+
+    return types.void(array, index, pixel), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _filled(typing: Any, value: Any) -> Any:
+    """Return a pixel with one value in all four channels."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _spread(builder, arguments[0])
+
+    return _Pixel(value)(value), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _scaled(typing: Any, weight: Any, pixel: Any) -> Any:
+    """Return a pixel times a ``weight``, in the weight's precision."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        factors = _spread(builder, arguments[0])
+        value = arguments[1]
+        if value.type != factors.type:
+            value = builder.fpext(value, factors.type)
+        return builder.fmul(factors, value, flags=_FLAGS)
+
+    return _Pixel(weight)(weight, pixel), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _sum(typing: Any, first: Any, second: Any) -> Any:
+    """Return the sum of two pixels."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.fadd(*arguments, flags=_FLAGS)
+
+    return first(first, second), generate
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _channels(typing: Any, pixel: Any) -> Any:
+    """Return a pixel's four channels as numbers."""
+    numbers = types.UniTuple(pixel.channel, 4)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        indices = map(ir.IntType(32), range(4))
+        channels = [builder.extract_element(arguments[0], index) for index in indices]
+        return context.make_tuple(builder, numbers, channels)
+
+    return numbers(pixel), generate
 
 
 @part
@@ -93,36 +219,25 @@ def source_index(
 
 
 @inline
-def _sample(source: Array, row: int, column: int, wy: Any, wx: Any) -> tuple[Any, Any, Any, Any]:
+def _sample(source: Array, row: int, column: int, wy: Any, wx: Any) -> Any:
     """Return the weighted sum of the pixels from (row, column) on, all of which exist."""
-    # Unsigned, so that numba does not check whether an index counts from the end.
-    i: Any = np.uint64(row)
-    j: Any = np.uint64(column)
-    s0 = s1 = s2 = s3 = np.float32(0)
-    for a in range(np.uint64(len(wy))):
-        r0 = r1 = r2 = r3 = np.float32(0)
-        for b in range(np.uint64(len(wx))):
-            r0 += wx[b] * source[i + a, j + b, 0]
-            r1 += wx[b] * source[i + a, j + b, 1]
-            r2 += wx[b] * source[i + a, j + b, 2]
-            r3 += wx[b] * source[i + a, j + b, 3]
-        s0 += wy[a] * r0
-        s1 += wy[a] * r1
-        s2 += wy[a] * r2
-        s3 += wy[a] * r3
-    return s0, s1, s2, s3
+    total = _scaled(wy[0], _sample_of_row(source, row, column, wx))
+    for a in range(1, len(wy)):
+        total = _sum(total, _scaled(wy[a], _sample_of_row(source, row + a, column, wx)))
+    return total
 
 
 @inline
-def _write(out: Array, row: int, column: int, v0: Any, v1: Any, v2: Any, v3: Any) -> None:
-    out[row, column, 0] = v0
-    out[row, column, 1] = v1
-    out[row, column, 2] = v2
-    out[row, column, 3] = v3
+def _sample_of_row(source: Array, row: int, column: int, wx: Any) -> Any:
+    total = _scaled(wx[0], _load(source, (row, column)))
+    for b in range(1, len(wx)):
+        total = _sum(total, _scaled(wx[b], _load(source, (row, column + b))))
+    return total
 
 
-@kernel
-def _finite_and_not_negative(s0: Any, s1: Any, s2: Any, s3: Any) -> bool:
+@inline
+def _finite_and_not_negative(pixel: Any) -> bool:
+    s0, s1, s2, s3 = _channels(pixel)
     return bool(s0 + s1 + s2 + s3 < np.inf and min(min(s0, s1), min(s2, s3)) >= 0)
 
 
@@ -238,9 +353,9 @@ def interpolating(weights: Weights) -> Callable[..., None]:
                 wx, wy = weights(fx), weights(fy)
                 if flag == INSIDE:
                     reach = len(wx) // 2 - 1
-                    s0, s1, s2, s3 = _sample(source, row - reach, column - reach, wy, wx)
-                    if _finite_and_not_negative(s0, s1, s2, s3):
-                        _write(out, i, j, s0, s1, s2, s3)
+                    pixel = _sample(source, row - reach, column - reach, wy, wx)
+                    if _finite_and_not_negative(pixel):
+                        _store(out, (i, j), pixel)
                         continue
                 if _careful(source, valid, row, column, fy, fx, wy, wx, topology, result):
                     out[i, j] = result[0]
@@ -275,7 +390,7 @@ def covering(weights: Weights) -> Callable[..., None]:
                 x, y = centers[i, j, 0], centers[i, j, 1]
                 ux, uy = footprints[i, j, 0, 0], footprints[i, j, 1, 0]
                 vx, vy = footprints[i, j, 0, 1], footprints[i, j, 1, 1]
-                a0 = a1 = a2 = a3 = np.float32(0)
+                total = _filled(np.float32(0))
                 sample_count = 0
                 for q in range(down):
                     v = np.float32(q) - half * np.float32(down - 1)
@@ -286,27 +401,21 @@ def covering(weights: Weights) -> Callable[..., None]:
                         fx, fy = px - np.floor(px), py - np.floor(py)
                         row, column = int(np.floor(py)), int(np.floor(px))
                         wx, wy = weights(fx), weights(fy)
-                        s0 = s1 = s2 = s3 = np.float32(np.nan)
+                        pixel = _filled(np.float32(np.nan))
                         if flag == INSIDE:
                             reach = len(wx) // 2 - 1
-                            s0, s1, s2, s3 = _sample(source, row - reach, column - reach, wy, wx)
-                        if not _finite_and_not_negative(s0, s1, s2, s3):
+                            pixel = _sample(source, row - reach, column - reach, wy, wx)
+                        if not _finite_and_not_negative(pixel):
                             if not _careful(
                                 source, valid, row, column, fy, fx, wy, wx, topology, result
                             ):
                                 continue
-                            s0 = result[0, 0]
-                            s1 = result[0, 1]
-                            s2 = result[0, 2]
-                            s3 = result[0, 3]
+                            pixel = _load(result, (0,))
                         sample_count += 1
-                        a0 += s0
-                        a1 += s1
-                        a2 += s2
-                        a3 += s3
+                        total = _sum(total, pixel)
                 if sample_count:
                     scale = np.float32(1) / np.float32(sample_count)
-                    _write(out, i, j, a0 * scale, a1 * scale, a2 * scale, a3 * scale)
+                    _store(out, (i, j), _scaled(scale, total))
 
     return kernel(cover)
 

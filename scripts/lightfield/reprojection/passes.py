@@ -1,4 +1,4 @@
-"""Reprojects passes: light as colour, normals as unit vectors, ids and mattes unmixed.
+"""Reprojects passes: light as colour, normals as unit vectors, all others unmixed.
 
 Light groups are scaled so that they still add up to the colour.
 """
@@ -12,7 +12,7 @@ import numpy as np
 from lightfield.formats.passes import Pass, is_group
 from lightfield.geometry.lenses import Array
 from lightfield.imaging.halves import widen
-from lightfield.imaging.images import HALF_MAX, KEY_ATTRIBUTE, Image, read_image, write_exr
+from lightfield.imaging.images import HALF_MAX, KEY_ATTRIBUTE, Image, read_image
 from lightfield.reprojection import kernels
 from lightfield.reprojection.colour import resample_colour
 from lightfield.reprojection.job import ReprojectionJob, SourceView
@@ -49,7 +49,7 @@ def write_passes(
             for name, value in image.attributes.items()
             if name.startswith("cryptomatte/")
         }
-        write_exr(path, channels, header | {KEY_ATTRIBUTE: key})
+        job.write_exr(path, channels, header | {KEY_ATTRIBUTE: key})
         shard_log.add(path, key)
 
 
@@ -139,8 +139,9 @@ def _resampled(planes: list[Array], view_pass: Pass, lens_map: LensMap) -> Array
     # A float holds every id exactly. Missing channels repeat the others.
     red, green, blue = (windows * 3)[:3]
     source = widen(red, green, blue)
-    if view_pass.kind in ("id", "matte"):
-        # An id cannot be mixed: take the ray through each pixel's centre.
+    if view_pass.kind in ("id", "matte", "variance"):
+        # An id cannot be mixed, and a mean of variances is not the variance of a mean. So take the
+        # ray through each pixel's centre.
         has_source = ~np.isnan(lens_map.centers[..., 0])
         lens_map = replace(
             lens_map,

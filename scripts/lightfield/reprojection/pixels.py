@@ -23,7 +23,6 @@ from lightfield.imaging.images import (
     Header,
     read_header,
     read_image,
-    write_exr,
     write_png,
 )
 from lightfield.imaging.primaries import PRIMARIES, are_rec_709, from_rec_709, to_rec_709
@@ -189,7 +188,7 @@ def write(
     for kind, path in outputs.items():
         match kind:
             case "exr":
-                _write_exr(path, image, attributes, job.settings.primaries)
+                _write_exr(job, path, image, attributes)
             case "png":
                 _write_png(path, image, {**attributes, **_PNG_OPTIONS})
             case "depth":
@@ -203,7 +202,7 @@ def write(
                 assert parameters and image.sensed
                 look = {"look": job.look.to_json()} if job.look else {}
                 described = {"key": key, **parameters.to_json(), **look}
-                _write_of_sensor(kind, path, image.sensed, described)
+                _write_of_sensor(job, kind, path, image.sensed, described)
         shard_log.add(path, key)
 
 
@@ -272,7 +271,7 @@ def _developed(
             pixels[rows] = encode(colour)
         if "exr" in outputs:
             stored = colour * alpha if transparent else colour
-            half[:, rows] = narrow(from_rec_709(stored, settings.primaries or "rec709"), 3)
+            narrow(from_rec_709(stored, settings.primaries or "rec709"), half[:, rows])
     if empty.any():
         covered[empty] = 0
         half[:, empty] = 0
@@ -293,7 +292,9 @@ def _sensed(sensed: Sensed, empty: Array) -> Sensed:
     return sensed
 
 
-def _write_of_sensor(kind: str, path: Path, sensed: Sensed, parameters: dict[str, Any]) -> None:
+def _write_of_sensor(
+    job: ReprojectionJob, kind: str, path: Path, sensed: Sensed, parameters: dict[str, Any]
+) -> None:
     """Write a file that lies beside the PNG of a sensor. ``parameters`` have the view's key."""
     key = parameters["key"]
     match kind:
@@ -304,14 +305,11 @@ def _write_of_sensor(kind: str, path: Path, sensed: Sensed, parameters: dict[str
         case "weights":
             assert sensed.weights is not None
             planes = np.moveaxis(sensed.weights, -1, 0)
-            write_exr(path, dict(zip("RGB", planes, strict=True)), {KEY_ATTRIBUTE: key})
+            job.write_exr(path, dict(zip("RGB", planes, strict=True)), {KEY_ATTRIBUTE: key})
 
 
-def _write_exr(path: Path, image: _Image, attributes: Attributes, primaries: str | None) -> None:
-    """Write R G B and Z. Write A if the view is transparent, or if no Z marks empty pixels.
-
-    ``primaries`` name the colour space of R G B. None is Rec. 709 without an attribute.
-    """
+def _write_exr(job: ReprojectionJob, path: Path, image: _Image, attributes: Attributes) -> None:
+    """Write R G B and Z. Write A if the view is transparent, or if no Z marks empty pixels."""
     channels = dict(zip("RGB", image.half, strict=True))
     if image.depth is not None:
         channels["Z"] = image.depth
@@ -319,8 +317,9 @@ def _write_exr(path: Path, image: _Image, attributes: Attributes, primaries: str
         channels["A"] = image.alpha.astype(np.float16)
     elif image.depth is None and image.has_empty:
         channels["A"] = (~image.empty).astype(np.float16)
-    chromaticities = PRIMARIES[primaries] if primaries else None
-    write_exr(path, channels, attributes, chromaticities=chromaticities)
+    # Without an attribute, readers take R G B for Rec. 709.
+    primaries = job.settings.primaries
+    job.write_exr(path, channels, attributes, PRIMARIES[primaries] if primaries else None)
 
 
 def _write_png(path: Path, image: _Image, attributes: Attributes) -> None:

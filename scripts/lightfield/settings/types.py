@@ -43,6 +43,8 @@ AtLeastOne = Annotated[int, Field(ge=1, le=2**31 - 1)]
 Auto = Literal["auto"]
 DenoisePrefilter = Literal["accurate", "fast", "none"]
 Primaries = Literal["rec709", "acescg"]
+# How EXR files are compressed. All of these keep every bit.
+Compression = Literal["zip", "zips", "piz", "htj2k", "zstd"]
 
 
 def unique_names(names: list[str]) -> list[str]:

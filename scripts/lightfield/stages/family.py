@@ -97,6 +97,16 @@ class Corpus(Stage[CorpusSettings]):
     )
 
 
+class ListScenes(PlainStage):
+    """Lists a corpus's exports for feed-forward trainers."""
+
+    name = "list_scenes"
+    function = "lightfield.family.scene_lists:write"
+
+    corpus: Path = reads("folder of the corpus", positional=True)
+    output: Path = writes("folder to write")
+
+
 class CountSettings(Settings):
     """The settings of scripts/count_members.py."""
 

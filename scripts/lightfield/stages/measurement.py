@@ -356,6 +356,9 @@ class Evaluate(Stage[EvaluationSettings]):
     masks: Path | None = reads(
         "folder of masks, <view>.png; pixels that are 0 in them are not compared", None
     )
+    lpips_weights: Path | None = reads(
+        "NPZ with the state dict of LPIPS, of the network alex or vgg, to also compute LPIPS", None
+    )
     output: Path = writes("folder to write")
 
 

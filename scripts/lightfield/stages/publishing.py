@@ -85,7 +85,7 @@ class Package(Stage[PackSettings]):
     """Packs a finished dataset as tar archives with a card."""
 
     name = "package"
-    version = 3
+    version = 4
     function = "lightfield.publishing.package:write"
     by_hand = PackageByHand
 

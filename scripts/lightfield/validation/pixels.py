@@ -235,6 +235,9 @@ class Examiner:
             lengths = np.linalg.norm(pixels, axis=0)
             wrong = int(((np.abs(lengths - 1) > _NOT_UNIT) & (lengths != 0)).sum())
             facts.fault("passes", f"{wrong} normals are not unit vectors", wrong)
+        if view_pass.kind == "variance":
+            wrong = int((pixels < 0).sum())
+            facts.fault("passes", f"{wrong} variances are below 0", wrong)
         if view_pass.kind == "value":
             wrong = int(((pixels < 0) | (pixels > 1)).sum())
             facts.fault("passes", f"{wrong} values are not between 0 and 1", wrong)

@@ -6,7 +6,7 @@ from functools import partial
 from lightfield.core.gpus import CUDA
 from lightfield.planning.cost import Cost, rendering, shard_threads
 from lightfield.planning.time_limits import limit_of_render, minutes_of_reprojection
-from lightfield.workflow.jobs import Job
+from lightfield.workflow.jobs import RENDER_PANORAMA, Job
 from lightfield.workflow.run import HasWildcards, Run
 
 
@@ -60,13 +60,27 @@ class JobRequests:
         shards = sum(len(dataset.shards) for dataset in run.chosen)
         need = rendering(run.asked(run.build.dataset, wildcards)).memory_bytes
         threads = shard_threads(run.cores, shards, need, run.memory)
+        # On each GPU one shard renders, and another one starts. More would only wait.
+        gpus = self._used_gpus
+        return max(threads, run.cores // (2 * gpus)) if gpus else threads
+
+    def threads_of_panorama(self, wildcards: HasWildcards) -> int:
+        """Return the cores of each panorama, so that the panoramas at work fit this machine.
+
+        A run's only panorama takes all cores, and the views wait for it. A GPU renders both.
+        """
+        run = self._run
+        panoramas = sum(dataset.panorama is not None for dataset in run.chosen)
+        jobs = run.cores if self._used_gpus else panoramas
+        need = self._cost_of(RENDER_PANORAMA, wildcards).memory_bytes
+        return shard_threads(run.cores, jobs, need, run.memory)
+
+    @property
+    def _used_gpus(self) -> int:
+        """The number of this machine's GPUs that Cycles renders on."""
         # Cycles may be unable to use an AMD GPU, unless the user names its kind.
-        is_hip = run.settings.device == "hip"
-        used_gpus = [each for each in run.local_gpus if each.variable == CUDA or is_hip]
-        if used_gpus:
-            # On each GPU one shard renders, and another one starts. More would only wait.
-            threads = max(threads, run.cores // (2 * len(used_gpus)))
-        return threads
+        is_hip = self._run.settings.device == "hip"
+        return sum(each.variable == CUDA or is_hip for each in self._run.local_gpus)
 
     def threads_of_batch(self, wildcards: HasWildcards) -> int:
         """Return the cores of each batch: one, or more if there are fewer batches than cores."""

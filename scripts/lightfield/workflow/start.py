@@ -230,9 +230,10 @@ class StartChecks:
         """Raise `UserError` for a user's file that a job would refuse."""
         run, names = self._run, planned.names
         if planned.job is CHECK_BLEND:
-            blend = Path(str(run.asked(run.build.scene, names).source.blend))
+            source = run.asked(run.build.scene, names).written.scene
+            blend = Path(str(source.blend))
             if blend.is_file():
-                expected_blend(names["name"], blend, sha256(blend))
+                expected_blend(names["name"], source, blend, sha256(blend))
         elif planned.job is INVENTORY:
             presence.check_external_files(run.asked(run.build.scene, names))
         elif is_import(run, planned):

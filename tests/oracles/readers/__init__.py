@@ -26,20 +26,27 @@ from oracles.readers import (
     colmap,
     colmap_frames,
     dnerf,
+    dust3r,
+    epipolar_volumes,
+    focal_stack,
     hci,
     instant_ngp,
     lichtfeld,
     mesh,
     miv,
+    miv_frames,
     multipleview,
     ncore,
+    ncore_frames,
     nerf_synthetic,
     nerfbaselines,
     nerfstudio,
     neural_3d_video,
     opendibr,
+    opendibr_frames,
     point_cloud,
     poses_csv,
+    quilt,
     scannetpp,
     scene_flow,
     splat,
@@ -50,6 +57,9 @@ from oracles.readers.contents import Exported
 READERS = {
     "coco": coco.read,
     "colmap": colmap.read,
+    "dust3r": dust3r.read,
+    "epipolar_volumes": epipolar_volumes.read,
+    "focal_stack": focal_stack.read,
     "hci": hci.read,
     "lichtfeld": lichtfeld.read,
     "mesh": mesh.read,
@@ -61,19 +71,31 @@ READERS = {
     "opendibr": opendibr.read,
     "point_cloud": point_cloud.read,
     "poses_csv": poses_csv.read,
+    "quilt": quilt.read,
     "scannetpp": scannetpp.read,
     "splat": splat.read,
     "wai": wai.read,
 }
 
-WITHOUT_VIEWS = ("coco", "mesh", "point_cloud", "splat")
+WITHOUT_VIEWS = (
+    "coco",
+    "epipolar_volumes",
+    "focal_stack",
+    "mesh",
+    "point_cloud",
+    "quilt",
+    "splat",
+)
 """The exports that have no poses of views."""
 
 SEQUENCE_READERS = {
     "colmap_frames": colmap_frames.read,
     "dnerf": dnerf.read,
+    "miv_frames": miv_frames.read,
     "multipleview": multipleview.read,
+    "ncore_frames": ncore_frames.read,
     "neural_3d_video": neural_3d_video.read,
+    "opendibr_frames": opendibr_frames.read,
     "scene_flow": scene_flow.read,
 }
 

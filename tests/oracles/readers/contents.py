@@ -54,7 +54,8 @@ class Part:
 class DepthRange:
     """The nearest and the farthest depth of a view in metres. ``meaning`` is "z" or "distance".
 
-    ``view`` is None for the range of all views together. Misses, and depths beyond ``farthest``,
+    ``view`` is None for the range of all views together. In a sequence, it is the range of all
+    frames. Misses, and depths beyond ``farthest``,
     count as ``farthest``.
     """
 
@@ -97,6 +98,7 @@ class Picture:
     - ``development``: exposure and white with which light becomes sRGB.
     - ``size``: width and height of a file without a header of its own.
     - ``objects``: names of the only objects whose pixels a mask keeps. Without any, it keeps all.
+    - ``frame``: the number of its frame in a raw video.
     """
 
     place: str
@@ -112,6 +114,7 @@ class Picture:
     size: tuple[int, int] = (0, 0)
     position: tuple[float, ...] = ()
     objects: tuple[str, ...] = ()
+    frame: int = 0
 
 
 @dataclass(frozen=True)
@@ -227,6 +230,12 @@ class Exported:
 def development(options: Mapping[str, Any]) -> tuple[float, float]:
     """Return the exposure and the white of an export's options."""
     return float(options.get("exposure", 0)), float(options.get("reinhard", 1))
+
+
+def video_rate(options: Mapping[str, Any], frames: Mapping[str, int]) -> float:
+    """Return the frames a second of a video of these frames, by the rate of their animation."""
+    numbers = list(frames.values())
+    return float(options["rate"]) * (len(numbers) - 1) / (numbers[-1] - numbers[0])
 
 
 def same(actual: Any, expected: Any) -> bool:

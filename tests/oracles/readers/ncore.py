@@ -8,6 +8,7 @@ import lzma
 import struct
 import zlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +29,10 @@ from oracles.readers.contents import (
 )
 
 METADATA = ".zmetadata.cbor.xz"
-# The coordinate frames of the camera, the points and the world.
-CAMERA_POSES = "('camera', 'world')"
+# The only camera of views that are no head.
+CAMERA = "camera"
+# The coordinate frames of the points and the world.
 POINT_POSE = "('points', 'world')"
-CAMERA = "intrinsics/default/cameras/camera"
-FRAMES = "cameras/camera/frames"
 POINTS = "lidars/points/frames"
 # The first has no rows of different times.
 SHUTTERS = ("GLOBAL", "ROLLING_TOP_TO_BOTTOM")
@@ -93,6 +93,23 @@ def _decompressed(path: Path, decompress: Callable[[bytes], bytes]) -> bytes:
 def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Exported:
     """Read the sequence of an export."""
     exported = Exported()
+    sequence = read_sequence(listing, exported)
+    read_camera(sequence, CAMERA, size, exported)
+    read_points(sequence.store, 0, exported)
+    return exported
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """A store, the names of its cameras, and the ``interval`` of its times in microseconds."""
+
+    store: Store
+    cameras: list[str]
+    interval: dict[str, Any]
+
+
+def read_sequence(listing: Path, exported: Exported) -> Sequence:
+    """Read the views.json of an export, and the metadata of its store."""
     path = listing.parent / "views.json"
     with reading(path, "sequence of NCore"):
         sequence = read_json(path)
@@ -106,33 +123,39 @@ def read(listing: Path, size: tuple[int, int], options: dict[str, Any]) -> Expor
             "version",
         ):
             exported.expect(f"{path}: {key}", sequence[key] == root[key], True)
-    lens_file = store.file(f"{CAMERA}/.zattrs")
+        cameras = [str(name) for name in entry["components"]["cameras"]]
+        return Sequence(store, cameras, sequence["sequence_timestamp_interval_us"])
+
+
+def read_camera(sequence: Sequence, name: str, size: tuple[int, int], exported: Exported) -> None:
+    """Read the lens of a camera, and all its views."""
+    store = sequence.store
+    intrinsics = f"intrinsics/default/cameras/{name}"
+    lens_file = store.file(f"{intrinsics}/.zattrs")
     with reading(lens_file, "camera of NCore"):
-        camera = _camera(store.attributes(CAMERA), str(lens_file), exported)
+        camera = _camera(store.attributes(intrinsics), str(lens_file), exported)
         exported.cameras.append(ExportedCamera(str(lens_file), camera))
-        shutter = store.attributes(CAMERA)["camera_model_parameters"]["shutter_type"]
+        shutter = store.attributes(intrinsics)["camera_model_parameters"]["shutter_type"]
         exported.expect(f"{lens_file}: shutter_type", shutter in SHUTTERS, True)
-    interval = sequence["sequence_timestamp_interval_us"]
-    _read_views(store, interval, size, shutter != SHUTTERS[0], exported)
-    _read_points(store, exported)
-    return exported
+    _read_views(sequence, name, size, shutter != SHUTTERS[0], exported)
 
 
 def _read_views(
-    store: Store,
-    interval: dict[str, Any],
+    sequence: Sequence,
+    name: str,
     size: tuple[int, int],
     is_rolling: bool,
     exported: Exported,
 ) -> None:
+    store, interval = sequence.store, sequence.interval
     poses_file = store.file("poses/default/dynamic_poses/.zattrs")
-    frames_file = store.file(f"{FRAMES}/.zattrs")
+    frames_file = store.file(f"cameras/{name}/frames/.zattrs")
     with reading(poses_file, "poses of NCore"):
-        trajectory = store.attributes("poses/default/dynamic_poses")[CAMERA_POSES]
+        trajectory = store.attributes("poses/default/dynamic_poses")[f"('{name}', 'world')"]
         times = [int(time) for time in trajectory["timestamps_us"]]
         matrices = numbers(trajectory["poses"], (len(times), 4, 4))
     with reading(frames_file, "times of NCore's frames"):
-        spans = store.attributes(FRAMES)["frames_timestamps_us"]
+        spans = store.attributes(f"cameras/{name}/frames")["frames_timestamps_us"]
         poses = dict(zip(times, enumerate(matrices @ _FLIP), strict=True))
         have_poses = all(time in poses for span in spans for time in span)
         exported.expect(f"{frames_file}: times are those of the poses", have_poses, True)
@@ -144,7 +167,7 @@ def _read_views(
         within = [interval["start"], interval["stop"] - 1] == [times[0], times[-1]]
         exported.expect(f"{poses_file}: times are those of the sequence", within, True)
     for span in spans if have_poses and fit_shutter else ():
-        frame = f"{FRAMES}/{span[1]}"
+        frame = f"cameras/{name}/frames/{span[1]}"
         place = store.file(f"{frame}/generic_data/.zattrs")
         with reading(place, "frame of NCore"):
             about = store.attributes(f"{frame}/generic_data")
@@ -189,9 +212,9 @@ def _view(
     return ExportedView(file, f"poses[{row}]", name, matrix, ends)
 
 
-def _read_points(store: Store, exported: Exported) -> None:
-    """Read the points: what a lidar at the world's origin measures at time 0."""
-    bundle = f"{POINTS}/0/ray_bundle"
+def read_points(store: Store, time: int, exported: Exported) -> None:
+    """Read the points: what a lidar at the world's origin measures at a time in microseconds."""
+    bundle = f"{POINTS}/{time}/ray_bundle"
     place = store.file(bundle)
     with reading(place, "points of NCore"):
         pose = store.attributes("poses/default/static_poses")[POINT_POSE]["pose"]
@@ -203,7 +226,7 @@ def _read_points(store: Store, exported: Exported) -> None:
             lengths = np.linalg.norm(directions, axis=-1)
             points: Floats = directions * distances[:, None] @ matrix[:3, :3].T + matrix[:3, 3]
         exported.expect(f"{place}: n_rays", store.attributes(bundle)["n_rays"], len(points))
-        colours = store.array(f"{POINTS}/0/generic_data/rgb").shape
+        colours = store.array(f"{POINTS}/{time}/generic_data/rgb").shape
         exported.expect(f"{place}: colours", colours, (len(points), 3))
     for index in np.flatnonzero(~(np.abs(lengths - 1) < 1e-5)).tolist():
         exported.faults.append(f"{place}: point {index}: its direction is not a unit vector")

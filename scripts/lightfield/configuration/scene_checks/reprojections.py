@@ -5,7 +5,7 @@ from lightfield.configuration.scene_blocks import SceneBlocks
 from lightfield.configuration.scene_checks.names import check_folder, check_rigs
 from lightfield.core.names import IMU, MESH, RENDERED, VIDEO
 from lightfield.formats import light_groups
-from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES
+from lightfield.formats.passes import FLOW, GROUP_PREFIX, PASSES, VARIANCE
 from lightfield.settings.base import suggestion
 
 # Names that a reprojection's folder cannot have.
@@ -49,6 +49,8 @@ def _check_reprojection(blocks: SceneBlocks, key: str, reprojection: Reprojectio
             raise ValueError(f"{key}.passes: {pass_name} is not in render.passes")
         if PASSES[pass_name].kind == "motion":
             raise ValueError(f"{key}.passes: motion is in pixels of the rendered lens")
+        if pass_name == VARIANCE and reprojection.relight is not None:
+            raise ValueError(f"{key}.passes: {VARIANCE} does not go with relight, which changes it")
 
 
 def _check_light(blocks: SceneBlocks, key: str, reprojection: ReprojectionEntry) -> None:

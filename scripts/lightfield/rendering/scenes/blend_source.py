@@ -31,7 +31,7 @@ def check(job: CheckBlend) -> None:
         raise changed_since_plan(scene_path(job.scene))
     status = job.blend.stat()
     digest = sha256(job.blend)
-    if lock := blend_lock.expected_blend(job.scene, job.blend, digest):
+    if lock := blend_lock.expected_blend(job.scene, source, job.blend, digest):
         blend_lock.record_blend(job.blend, digest, lock)
     if not source.sha256:
         # Without its lock file, the .blend is checked again.

@@ -36,6 +36,7 @@ from lightfield.rendering.setup import (
     moving_camera,
     principled_passes,
     pruning,
+    shadow_catchers,
 )
 from lightfield.stages.measurement import RENDERS_ON, CheckDevice
 
@@ -94,6 +95,7 @@ def set_up(
     _set_quality(lightfield.render)
     _set_output(scene, lightfield, threads)
     _set_passes(scene, passes)
+    shadow_catchers.check(passes)
     principled_passes.set_up(view_layer(scene), passes)
     if groups := lightfield.render.emitters_of_groups:
         light_groups.set_up(view_layer(scene), groups)

@@ -11,12 +11,13 @@ import bpy
 import mathutils
 import numpy as np
 
-from lightfield.formats.passes import Pass
+from lightfield.formats.passes import VARIANCE, Pass
 from lightfield.imaging.images import Attribute
 from lightfield.rendering.scenes import namesakes
 from lightfield.rendering.scenes.open_scene import OpenScene
 from lightfield.rendering.scenes.render_graph import changed
 from lightfield.rendering.setup.cycles import view_layer
+from lightfield.rendering.views import sample_parts
 from lightfield.rendering.views.view import Array, Rendered, render_view
 
 _COUNTS = "Debug Sample Count"
@@ -60,12 +61,16 @@ def render_colour(
     counts_samples = view_layer(bpy.context.scene).cycles.pass_debug_sample_count
     colour_passes = [view_pass for view_pass in passes if view_pass.of_colour]
     mattes = [view_pass for view_pass in colour_passes if view_pass.kind == "matte"]
+    has_variance = any(view_pass.kind == "variance" for view_pass in colour_passes)
     matte = None
-    if mattes and opened.namesakes:
+    # The mean of hashes is no hash.
+    if mattes and (opened.namesakes or has_variance):
         matte = _render_matte(opened, world_from_camera, seed, mattes)
     _reports.clear()
     needed: dict[str, str] = {}
     for view_pass in colour_passes:
+        if matte and view_pass in mattes:
+            continue
         channels = {"matte": "rgba", "value": "X"}.get(view_pass.kind, "RGB")
         needed |= dict.fromkeys(view_pass.needed, channels)
         if view_pass.unless:
@@ -73,7 +78,14 @@ def render_colour(
     needed["Combined"] = "RGBA" if alpha else "RGB"
     if counts_samples:
         needed[_COUNTS] = "X"
-    rendered = render_view(opened, world_from_camera, seed, needed)
+    to_rec_709 = _to_rec_709()
+    if has_variance:
+        rendered, variance = sample_parts.render_in_parts(
+            opened, world_from_camera, seed, needed, _divisors(colour_passes), to_rec_709
+        )
+        rendered.passes[VARIANCE] = variance
+    else:
+        rendered = render_view(opened, world_from_camera, seed, needed)
     if matte:
         rendered.passes.update(matte.passes)
     samples = None
@@ -83,7 +95,6 @@ def render_colour(
     composed = {
         view_pass.name: _composed(view_pass, rendered.passes) for view_pass in colour_passes
     }
-    to_rec_709 = _to_rec_709()
     if to_rec_709 is not None:
         lights = [composed[each.name] for each in colour_passes if each.kind == "light"]
         for pixels in (rendered.passes["Combined"], *lights):
@@ -103,7 +114,7 @@ def render_colour(
 def _render_matte(
     opened: OpenScene, world_from_camera: Array, seed: int, mattes: Iterable[Pass]
 ) -> Rendered:
-    """Render ``mattes`` in which objects of equal names have their full names.
+    """Render ``mattes`` alone. Objects of equal names have their full names in them.
 
     The camera's rays are the same as for the colour. Cycles follows no other rays.
     """
@@ -114,6 +125,11 @@ def _render_matte(
             stack.enter_context(changed(cycles, name, value))
         stack.enter_context(namesakes.under_full_names(opened.namesakes))
         return render_view(opened, world_from_camera, seed, needed)
+
+
+def _divisors(passes: Iterable[Pass]) -> dict[str, str]:
+    """Return the Cycles passes by which Cycles divides others, by the names of the others."""
+    return {name: each.factor for each in passes if each.factor for name in each.cycles}
 
 
 def _to_rec_709() -> Array | None:
@@ -128,6 +144,8 @@ def _to_rec_709() -> Array | None:
 
 def _composed(view_pass: Pass, passes: Mapping[str, Array]) -> Array:
     """Return a pass of the dataset, composed from Cycles' ``passes`` by name."""
+    if view_pass.kind == "variance":
+        return passes[VARIANCE]
     parts = [passes[name] for name in view_pass.cycles]
     if view_pass.kind == "matte":
         return np.concatenate(parts, axis=-1)

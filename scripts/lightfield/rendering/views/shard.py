@@ -61,7 +61,7 @@ def render(job: RenderShard) -> None:
     """
     lightfield = LightField.read(job.lightfield)
     folder = job.output
-    images.check_codec(lightfield.render.compression or "zip")
+    images.check_codec("render.compression", lightfield.render.compression or "zip")
     # Remove leftovers on the render node: shared memory of killed jobs may fill its RAM.
     leftovers.remove()
     history = History()
@@ -387,14 +387,17 @@ def pass_channels(
         planes = np.moveaxis(colour.passes[view_pass.name], -1, 0)
         named = dict(zip(view_pass.channels, planes, strict=True))
         return named, passes.matte_header(colour.manifest)
-    if view_pass.of_colour:
+    if view_pass.of_colour and view_pass.kind != "variance":
         channels, attributes = colour_channels(colour.passes[view_pass.name])
         numbers = [np.nan_to_num(plane, nan=0) for plane in channels.values()]
         return dict(zip(view_pass.channels, numbers, strict=True)), attributes
-    assert geometry
     attributes = {}
-    pixels = np.atleast_3d(geometry.passes[view_pass.name])
-    if view_pass.kind == "normal":
+    if view_pass.kind == "variance":
+        pixels = colour.passes[view_pass.name]
+    else:
+        assert geometry
+        pixels = np.atleast_3d(geometry.passes[view_pass.name])
+    if view_pass.kind in ("normal", "variance"):
         attributes[images.NAN_ATTRIBUTE] = int(np.isnan(pixels).sum())
         pixels = np.nan_to_num(pixels, nan=0)
     elif view_pass.kind == "motion":

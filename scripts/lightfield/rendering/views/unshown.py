@@ -11,7 +11,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from lightfield.formats.passes import PARTS_OF_LIGHT, Pass
+from lightfield.formats.passes import PARTS_OF_LIGHT, VARIANCE, Pass
 from lightfield.imaging.images import LEAST_ALPHA
 from lightfield.rendering.views.colour_pass import Colour
 from lightfield.rendering.views.geometry_pass import ViewGeometry, cleared
@@ -23,12 +23,12 @@ def left_out(
 ) -> tuple[Colour, ViewGeometry | None, int]:
     """Return a view without the surfaces that it does not show, and how many pixels had one.
 
-    ``geometry`` has its alpha. Passes of light keep their light.
+    ``geometry`` has its alpha. Passes of light keep their light, and the colour its variance.
     """
     # As the view's file of half floats has it.
     shows_nothing = colour.pixels[..., 3].astype(np.float16) < LEAST_ALPHA
     of_surface = [view_pass.name for view_pass in view_passes if view_pass.of_colour]
-    of_surface = [name for name in of_surface if name not in PARTS_OF_LIGHT]
+    of_surface = [name for name in of_surface if name not in (*PARTS_OF_LIGHT, VARIANCE)]
     passes = {name: cleared(colour.passes[name], shows_nothing) for name in of_surface}
     colour = replace(colour, passes=colour.passes | passes)
     if geometry is None:
