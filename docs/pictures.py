@@ -166,6 +166,16 @@ def draw_blend(path: Path, folder: Path) -> None:
     ImageOps.fit(picture, WAY).save(path, quality=88)
 
 
+def draw_splat(path: Path, folder: Path) -> None:
+    """Draw a view of the evaluations in ``folder``: splat, walk."""
+    tiles = {}
+    for name in ("splat", "walk"):
+        picture = folder / name / "pictures" / "view_0003f.png"
+        truth, shown, _ = np.hsplit(np.asarray(Image.open(picture).convert("RGB")), 3)
+        tiles |= {name: Image.fromarray(shown), "true view": Image.fromarray(truth)}
+    sheet(path, {name: tiles[name] for name in ("splat", "walk", "true view")}, 3)
+
+
 def draw_places(path: Path) -> None:
     """Draw the first places of each builder, from the pictures of all their places."""
     picture = Image.new("RGB", WAY)
@@ -184,6 +194,7 @@ def main() -> None:
     parser.add_argument("--points", type=Path, help="dataset around an object, with alpha")
     parser.add_argument("--depth", type=Path, help="dataset of fisheyes, of which one is drawn")
     parser.add_argument("--blend", type=Path, help="dataset of a .blend, whose first view is drawn")
+    parser.add_argument("--splat", type=Path, help="folder of the evaluations splat and walk")
     arguments = parser.parse_args()
     draw_rigs(FOLDER / "rig_types.png")
     draw_places(FOLDER / "way_cluster.jpg")
@@ -194,6 +205,7 @@ def main() -> None:
         ("points", draw_points, "way_train.jpg"),
         ("depth", draw_depth, "way_study.jpg"),
         ("blend", draw_blend, "way_blend.jpg"),
+        ("splat", draw_splat, "splat.jpg"),
     ):
         if source := getattr(arguments, flag):
             draw(FOLDER / name, source)

@@ -73,7 +73,7 @@ _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True)
-class Frame:
+class TimedView:
     """The times of a view's picture in microseconds, and the camera's poses (4, 4) by their times.
 
     ``source`` has the view. All rows see light from ``start`` to ``end``, or the first at ``start``
@@ -95,7 +95,7 @@ class Frame:
         begin: int,
         duration: int,
         rows: tuple[float, float] | None,
-    ) -> "Frame":
+    ) -> "TimedView":
         """Return the frame of a view. Its exposure lasts from ``begin``, for this ``duration``.
 
         ``rows`` are the times, −½ to ½, of the first and the last row of a rolling shutter.
@@ -117,7 +117,7 @@ class Stream:
 
     name: str
     lens: Lens
-    frames: Sequence[Frame]
+    frames: Sequence[TimedView]
     is_rolling: bool
 
     @classmethod
@@ -126,7 +126,8 @@ class Stream:
         rows = row_times_of(source, sensor.lens)
         views = sorted(sensor.views, key=lambda view: view.name)
         frames = [
-            Frame.of(source, view, index * STEP, EXPOSURE, rows) for index, view in enumerate(views)
+            TimedView.of(source, view, index * STEP, EXPOSURE, rows)
+            for index, view in enumerate(views)
         ]
         name = f"{CAMERA}{number or ''}"
         if sensor.mount:
@@ -374,7 +375,7 @@ def _write_poses(store: ZarrStore, streams: Sequence[Stream]) -> None:
     store.group("poses/default/dynamic_poses", poses)
 
 
-def _poses(frames: Sequence[Frame]) -> dict[str, Any]:
+def _poses(frames: Sequence[TimedView]) -> dict[str, Any]:
     """Return the poses of a camera by their times."""
     matrices = [matrix for frame in frames for matrix in frame.poses.values()]
     return {

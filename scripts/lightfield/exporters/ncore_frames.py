@@ -14,7 +14,7 @@ from pydantic import Field
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import SourceDataset
 from lightfield.exporters.base import AnimationRate, PointCount
-from lightfield.exporters.ncore import Frame, NCoreSequence, Stream, free_name, row_times_of
+from lightfield.exporters.ncore import NCoreSequence, Stream, TimedView, free_name, row_times_of
 
 _MICROSECONDS = 1_000_000
 # Of a moving camera's exposure, in frames of the animation.
@@ -60,7 +60,7 @@ def _stream(seen: Mapping[int, SourceDataset], number: int, duration: int) -> St
     lens = first.view(view).lens
     rows = row_times_of(first, lens)
     frames = [
-        Frame.of(source, source.lightfield.views[number], time, duration, rows)
+        TimedView.of(source, source.lightfield.views[number], time, duration, rows)
         for time, source in seen.items()
     ]
     name = free_name(view.name, f"{first.lightfield.path}: frames")
