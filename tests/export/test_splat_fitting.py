@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from sphere import look_at_ball, write_views
+from sphere import look_at_ball, look_at_ball_alone, make_transparent, write_views
 
 from lightfield.export import splats
 from lightfield.export.source import SourceDataset
@@ -18,9 +18,11 @@ from lightfield.formats import gaussians
 from lightfield.formats.gaussians import HARMONIC_0, Gaussians
 from lightfield.formats.lightfield import View
 from lightfield.geometry.lenses import from_camera
+from lightfield.imaging import images
 
 FISHEYE = {"lens": "equidistant", "fov": 180, "resolution": [64, 64]}
 RIG = {"type": "cuboid", "cameras": [2, 2, 2], "size": 0.6}
+MANY = 10**6
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +35,7 @@ def source(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def made(source):
-    return splats.make(source, 10**6)
+    return splats.make(source, MANY)
 
 
 def quality(source, shown):
@@ -46,14 +48,14 @@ def quality(source, shown):
 
 
 def test_fitted_colours_are_nearer_to_views_that_do_not_train(source, made):
-    assert quality(source, fitted(made, source)) > quality(source, made) + 1
+    assert quality(source, fitted(made, source, MANY)) > quality(source, made) + 1
 
 
 def test_wrong_colours_are_brought_back(source, made):
     random = np.random.default_rng(0)
     harmonics = made.harmonics + random.normal(0, 0.2 / HARMONIC_0, made.harmonics.shape)
     wrong = replace(made, harmonics=harmonics)
-    assert quality(source, fitted(wrong, source)) > quality(source, wrong) + 6
+    assert quality(source, fitted(wrong, source, MANY)) > quality(source, wrong) + 6
 
 
 def test_gaussians_where_nothing_is_fade(source, made):
@@ -70,13 +72,13 @@ def test_gaussians_where_nothing_is_fade(source, made):
     both = Gaussians(
         **{name: np.concatenate([getattr(made, name), getattr(floating, name)]) for name in names}
     )
-    opacities = fitted(both, source).opacities
+    opacities = fitted(both, source, MANY).opacities
     assert (opacities[-count:] < 0.85).all()
     assert np.median(opacities[:-count]) > 0.95
 
 
 def test_places_sizes_and_rotations_stay(source, made):
-    after = fitted(made, source)
+    after = fitted(made, source, MANY)
     for name in ("positions", "scales", "rotations"):
         np.testing.assert_array_equal(getattr(after, name), getattr(made, name))
     assert after.harmonics.shape == made.harmonics.shape
@@ -85,7 +87,32 @@ def test_places_sizes_and_rotations_stay(source, made):
 def test_gaussians_much_larger_than_pixels_are_fitted_to_smaller_views(source):
     """About 300 Gaussians for eight views of 64²."""
     coarse = splats.make(source, 300)
-    assert quality(source, fitted(coarse, source)) > quality(source, coarse) + 1
+    assert quality(source, fitted(coarse, source, 300)) > quality(source, coarse) + 1
+
+
+def test_colour_and_outline_of_a_ball_before_nothing_are_fitted(tmp_path):
+    """Most pixels are empty, so there are few Gaussians. Still, none is larger than a pixel."""
+    folder = tmp_path / "dataset"
+    write_views(folder, FISHEYE | {"resolution": [192, 192]}, RIG, see=look_at_ball_alone)
+    make_transparent(folder, 1)
+    for path in folder.glob("exr/*.exr"):
+        image = images.read_image(path)
+        outline = np.isfinite(image.channels["Z"]).astype(np.float16)
+        images.write_exr(path, image.channels | {"A": outline}, image.attributes)
+    source = SourceDataset(folder, "", ".exr")
+    before = splats.make(source, MANY)
+    after = fitted(before, source, MANY)
+
+    def wrong_coverage(shown):
+        return np.mean(
+            [
+                (draw(shown, view, source.lens).coverage - source.alpha(view) / 255) ** 2
+                for view in splits(source.lightfield).test
+            ]
+        )
+
+    assert quality(source, after) > quality(source, before) + 0.5
+    assert wrong_coverage(after) < 0.9 * wrong_coverage(before)
 
 
 def test_corrections_are_the_derivatives_of_the_drawn_picture():

@@ -29,10 +29,13 @@ _LEAST_WEIGHTS = np.array([0.001, 0.001, 0.001, 0.05])
 _OPACITIES = (1 / 255, 0.999)
 
 
-def fitted(gaussians: Gaussians, source: SourceDataset) -> Gaussians:
-    """Return ``gaussians`` with colours and opacities that show the views that train."""
+def fitted(gaussians: Gaussians, source: SourceDataset, count: int) -> Gaussians:
+    """Return ``gaussians`` with colours and opacities that show the views that train.
+
+    ``count`` is the largest number for which they were made, so it tells how large they are.
+    """
     views = splits(source.lightfield).train
-    lens = _coarse_lens(source, views, len(gaussians))
+    lens = _coarse_lens(source, views, count)
     progress = Progress(_ROUNDS * len(views), "fit", "views")
     for _ in range(_ROUNDS):
         changes = np.zeros((len(gaussians), 4))

@@ -43,5 +43,5 @@ class Splat(ForTraining):
             # Only here, because its kernels take long to load.
             from lightfield.export.splat_fitting import fitted
 
-            made = fitted(made, source)
+            made = fitted(made, source, self.gaussians)
         gaussians.write(folder / "splat.ply", made)
