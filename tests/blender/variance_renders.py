@@ -21,7 +21,6 @@ from lightfield.rendering.setup import cycles
 from lightfield.rendering.views.colour_pass import render_colour
 from lightfield.rendering.views.geometry_pass import render_geometry
 
-FOLDER = Path(sys.argv[1])
 SIZE = 32
 # The rooms are rendered often.
 ROOM_SIZE = 16
@@ -60,7 +59,7 @@ def add_balls():
     bpy.context.object.data.energy = 100
 
 
-def build_open():
+def build_open(folder):
     """Save balls on a floor under the sky, and the artist's camera in front of them."""
     blend_file.new_scene()
     bpy.ops.mesh.primitive_plane_add(size=20)
@@ -74,10 +73,10 @@ def build_open():
     camera.dof.aperture_fstop = 0.2
     bpy.context.scene.camera = bpy.data.objects.new("artist", camera)
     bpy.context.collection.objects.link(bpy.context.scene.camera)
-    blend_file.save_scene(FOLDER / "open.blend")
+    blend_file.save_scene(folder / "open.blend")
 
 
-def build_room(name, bounces):
+def build_room(folder, name, bounces):
     """Save the balls in a closed room.
 
     If light ``bounces``, its lamp is behind a board, and noise is rare bright paths. Otherwise the
@@ -96,7 +95,7 @@ def build_room(name, bounces):
         bpy.ops.object.light_add(type="AREA", location=(0, 1, 5.5))
         bpy.context.object.data.energy = 200
         bpy.context.object.data.size = 4
-    blend_file.save_scene(FOLDER / f"{name}.blend")
+    blend_file.save_scene(folder / f"{name}.blend")
 
 
 def lightfield(size=SIZE, **render):
@@ -106,16 +105,16 @@ def lightfield(size=SIZE, **render):
     return LightField.from_rig(rig, lens, depth="z", frame=1, scene={}, render=block)
 
 
-def set_up(content, scene="open"):
+def set_up(folder, content, scene="open"):
     """Open a scene for a light field. Return it, and the pose of the only view."""
-    opened = cycles.set_up(FOLDER / f"{scene}.blend", None, content, "cpu", 1)
+    opened = cycles.set_up(folder / f"{scene}.blend", None, content, "cpu", 1)
     return opened, content.views[0].world_from_camera
 
 
-def view(**render):
+def view(folder, **render):
     """Return all that the view shows, by name. "centre" is the prefix of what has no samples."""
     content = lightfield(**render)
-    opened, pose = set_up(content)
+    opened, pose = set_up(folder, content)
     names = [each.name for each in content.passes if not each.of_colour]
     geometry = render_geometry(opened, pose, names)
     colour = render_colour(opened, pose, 5, content.passes, content.transparent)
@@ -129,19 +128,19 @@ def view(**render):
     }
 
 
-def write_cases():
+def write_cases(folder):
     for name, render in CASES.items():
         passes = [*render.get("passes", ()), VARIANCE]
-        whole, mean = view(**render), view(**render | {"passes": passes})
+        whole, mean = view(folder, **render), view(folder, **render | {"passes": passes})
         both = {f"whole {key}": value for key, value in whole.items()}
         both |= {f"mean {key}": value for key, value in mean.items()}
-        np.savez(FOLDER / f"{name}.npz", **both)
+        np.savez(folder / f"{name}.npz", **both)
 
 
-def write_parts():
+def write_parts(folder):
     """Write the pass, and the parts that Cycles itself makes of a whole view's samples."""
     content = lightfield(passes=[VARIANCE])
-    opened, pose = set_up(content)
+    opened, pose = set_up(folder, content)
     # The seed of the dataset's view.
     seed = view_seed(content.render.seed, content.views[0].name)
     measured = render_colour(opened, pose, seed, content.passes).passes[VARIANCE]
@@ -151,33 +150,33 @@ def write_parts():
     parts = []
     for settings.sample_offset in range(0, SAMPLES, SAMPLES // SAMPLE_PARTS):
         parts.append(render_colour(opened, pose, seed).pixels)
-    np.savez(FOLDER / "parts.npz", measured=measured, parts=parts)
+    np.savez(folder / "parts.npz", measured=measured, parts=parts)
 
 
-def write_seeds(scene):
+def write_seeds(folder, scene):
     """Write the colour and the pass of a view for each of many seeds."""
     content = lightfield(ROOM_SIZE, passes=[VARIANCE])
-    opened, pose = set_up(content, scene)
+    opened, pose = set_up(folder, content, scene)
     views = [render_colour(opened, pose, 1000 + seed, content.passes) for seed in range(SEEDS)]
     np.savez(
-        FOLDER / f"{scene}.npz",
+        folder / f"{scene}.npz",
         colour=[each.pixels for each in views],
         variance=[each.passes[VARIANCE] for each in views],
     )
 
 
-def main():
-    build_open()
-    build_room("lamp behind a board", bounces=True)
-    build_room("large lamp", bounces=False)
-    write_cases()
-    write_parts()
-    write_seeds("lamp behind a board")
-    write_seeds("large lamp")
+def main(folder):
+    build_open(folder)
+    build_room(folder, "lamp behind a board", bounces=True)
+    build_room(folder, "large lamp", bounces=False)
+    write_cases(folder)
+    write_parts(folder)
+    write_seeds(folder, "lamp behind a board")
+    write_seeds(folder, "large lamp")
     content = lightfield(passes=["normal", VARIANCE])
-    receipt = FOLDER / "receipts/dataset.jsonl"
-    one_shard.render(content, FOLDER / "dataset", FOLDER / "open.blend", receipt=receipt)
+    receipt = folder / "receipts/dataset.jsonl"
+    one_shard.render(content, folder / "dataset", folder / "open.blend", receipt=receipt)
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]))
