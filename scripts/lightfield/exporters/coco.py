@@ -114,10 +114,12 @@ def _annotations(
     Two objects may share an instance's number: then each has an annotation.
     """
     shown = objects > 0
-    pairs = np.stack([objects[shown], instances[shown]], axis=-1)
-    different, index = np.unique(pairs, axis=0, return_inverse=True)
+    # One number for both, because numpy is slow to find different rows.
+    pairs = objects[shown].astype(np.uint64) << np.uint64(32) | instances[shown]
+    numbers, index = np.unique(pairs, return_inverse=True)
+    different = np.stack([numbers >> np.uint64(32), numbers & np.uint64(0xFFFFFFFF)], axis=-1)
     labels = np.full(objects.shape, -1)
-    labels[shown] = index.ravel()
+    labels[shown] = index
     areas = np.bincount(labels[shown], minlength=len(different))
     annotations: list[dict[str, Any]] = [
         {"category_id": category, "bbox": box, "area": area, "iscrowd": 0, "instance": instance}
