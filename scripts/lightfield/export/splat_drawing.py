@@ -241,6 +241,21 @@ def _falloff(u: float, v: float, covariance: Array) -> Any:
     return math.exp(-(c * u * u - 2 * b * u * v + a * v * v) / (a * c - b * b) / 2)
 
 
+@inline
+def _part(opacity: float, i: int, j: int, transmitted: Array, opaque: Array) -> float:
+    """Return the part of pixel (i, j) that a Gaussian of this ``opacity`` there covers.
+
+    It is 0 if the pixel takes no more of it. Notes whether the pixel is then ``opaque``.
+    """
+    alpha = min(_MOST, opacity)
+    if opaque[i, j] or alpha < _LEAST:
+        alpha = 0.0
+    elif transmitted[i, j] * (1 - alpha) <= _DARK:
+        opaque[i, j] = True
+        alpha = 0.0
+    return alpha
+
+
 @kernel
 def _blend(
     pixels: Array,
@@ -268,15 +283,12 @@ def _blend(
         for i in range(top, bottom):
             for j in range(left, right):
                 falloff = _falloff(j + 0.5 - pixels[n, 0], i + 0.5 - pixels[n, 1], covariance[n])
-                alpha = min(_MOST, opacities[n] * falloff)
-                if opaque[i, j] or alpha < _LEAST:
-                    continue
-                rest = transmitted[i, j] * (1 - alpha)
-                if rest <= _DARK:
-                    opaque[i, j] = True
+                alpha = _part(opacities[n] * falloff, i, j, transmitted, opaque)
+                if alpha == 0:
                     continue
                 for k in range(3):
                     colour[i, j, k] += alpha * transmitted[i, j] * shades[n, k]
+                rest = transmitted[i, j] * (1 - alpha)
                 if transmitted[i, j] > _HALF >= rest:
                     distance[i, j] = away[n]
                 transmitted[i, j] = rest
@@ -316,12 +328,8 @@ def _gather(
         for i in range(top, bottom):
             for j in range(left, right):
                 falloff = _falloff(j + 0.5 - pixels[n, 0], i + 0.5 - pixels[n, 1], covariance[n])
-                alpha = min(_MOST, opacities[n] * falloff)
-                if opaque[i, j] or alpha < _LEAST:
-                    continue
-                rest = transmitted[i, j] * (1 - alpha)
-                if rest <= _DARK:
-                    opaque[i, j] = True
+                alpha = _part(opacities[n] * falloff, i, j, transmitted, opaque)
+                if alpha == 0:
                     continue
                 share = alpha * transmitted[i, j]
                 for k in range(4):
@@ -336,4 +344,4 @@ def _gather(
                     if k < 3:
                         changes[n, k] += share * missing[i, j, k]
                         weights[n, k] += share
-                transmitted[i, j] = rest
+                transmitted[i, j] *= 1 - alpha
