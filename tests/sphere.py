@@ -107,11 +107,11 @@ def make_transparent(folder, alpha):
         images.write_exr(view, image.channels | {"A": covered}, image.attributes)
 
 
-def look_at_ball(lens, matrix):
+def look_at_ball(lens, matrix, place=BALL):
     """Return linear colour, and distance, that a camera sees of the sphere with a ball in it."""
     colour, distance = look(lens, matrix)
     rays = lens.pixel_rays() @ matrix[:3, :3].T
-    to_ball = BALL - matrix[:3, 3]
+    to_ball = place - matrix[:3, 3]
     along = rays @ to_ball
     with np.errstate(invalid="ignore"):
         nearest = along - np.sqrt(BALL_RADIUS**2 - (to_ball @ to_ball - along**2))

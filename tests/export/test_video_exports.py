@@ -7,6 +7,7 @@ it.
 import json
 import shutil
 import subprocess
+from functools import partial
 
 import cv2
 import numpy as np
@@ -15,7 +16,7 @@ from oracles import sequence as oracle
 from oracles.readers import ncore
 from oracles.readers.contents import Exported
 from pydantic import TypeAdapter, ValidationError
-from sphere import BALL, BALL_RADIUS, LENSES, RADIUS, RED, colour_of, look, write_views
+from sphere import BALL, BALL_RADIUS, LENSES, RADIUS, RED, colour_of, look_at_ball, write_views
 from test_exports import ncore_pixels, of_disparity, omaf_points, opengl_points
 
 from lightfield.configuration.scene_yaml import Scene
@@ -47,27 +48,11 @@ def ball_at(index):
     return BALL + index * MOVE
 
 
-def see_ball_at(place):
-    """Return what cameras see of the sphere with a ball at a place: linear colour, and distance."""
-
-    def see(lens, matrix):
-        colour, distance = look(lens, matrix)
-        rays = lens.pixel_rays() @ matrix[:3, :3].T
-        to_ball = place - matrix[:3, 3]
-        along = rays @ to_ball
-        with np.errstate(invalid="ignore"):
-            nearest = along - np.sqrt(BALL_RADIUS**2 - (to_ball @ to_ball - along**2))
-            hit = nearest > 0
-        return np.where(hit[..., None], RED, colour), np.where(hit, nearest, distance)
-
-    return see
-
-
 def write_sequence(folder, lens, numbers=NUMBERS, travel=(0, 0, 0), **changes):
     """Write a sequence. Return it. The rig's middle moves by ``travel`` from frame to frame."""
     for index, number in enumerate(numbers):
         center = np.add(RIG["center"], np.multiply(index, travel)).tolist()
-        see = see_ball_at(ball_at(index))
+        see = partial(look_at_ball, place=ball_at(index))
         write_views(folder / "dataset", lens, RIG | {"center": center}, see=see)
         path = folder / "dataset/lightfield.json"
         content = LightField.read(path).changed(frame=number, **changes)
