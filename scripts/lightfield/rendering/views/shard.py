@@ -387,16 +387,14 @@ def pass_channels(
         planes = np.moveaxis(colour.passes[view_pass.name], -1, 0)
         named = dict(zip(view_pass.channels, planes, strict=True))
         return named, passes.matte_header(colour.manifest)
-    if view_pass.of_colour and view_pass.kind != "variance":
+    if view_pass.kind in ("light", "value"):
         channels, attributes = colour_channels(colour.passes[view_pass.name])
         numbers = [np.nan_to_num(plane, nan=0) for plane in channels.values()]
         return dict(zip(view_pass.channels, numbers, strict=True)), attributes
     attributes = {}
-    if view_pass.kind == "variance":
-        pixels = colour.passes[view_pass.name]
-    else:
-        assert geometry
-        pixels = np.atleast_3d(geometry.passes[view_pass.name])
+    of_view = colour if view_pass.of_colour else geometry
+    assert of_view
+    pixels = np.atleast_3d(of_view.passes[view_pass.name])
     if view_pass.kind in ("normal", "variance"):
         attributes[images.NAN_ATTRIBUTE] = int(np.isnan(pixels).sum())
         pixels = np.nan_to_num(pixels, nan=0)
