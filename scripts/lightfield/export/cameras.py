@@ -13,6 +13,7 @@ from lightfield.geometry.lenses.equirectangular import Equirectangular
 from lightfield.geometry.lenses.increasing_polynomial import IncreasingPolynomial
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.rotations import OPENCV_AXES
 
 
 def focal_pixels(lens: Rectilinear | CalibratedLens | Equidistant) -> tuple[float, float]:
@@ -27,7 +28,7 @@ def focal_pixels(lens: Rectilinear | CalibratedLens | Equidistant) -> tuple[floa
 
 def opencv_matrix(view: View) -> Array:
     """Return a view's camera-to-world matrix (4, 4), with x right, y down and z forward."""
-    return np.asarray(view.world_from_camera @ np.diag([1.0, -1.0, -1.0, 1.0]))
+    return np.asarray(view.world_from_camera @ OPENCV_AXES)
 
 
 def opencv_pinhole(lens: Rectilinear) -> tuple[float, float, float, float]:

@@ -31,9 +31,8 @@ from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
 from lightfield.geometry.lenses.unified import Unified
 from lightfield.geometry.rigs import Rig
+from lightfield.geometry.rotations import OPENCV_AXES
 
-# From Blender's camera (y up, looks along −z) to Kalibr's (y down, looks along z).
-_FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 # The number of coefficients of Kalibr's radtan: k1, k2, p1 and p2.
 _RADTAN = 4
 
@@ -70,7 +69,7 @@ class Kalibr(Joined):
         sensors = heads.sensors(heads.by_camera(source))
         chain = {f"cam{n}": _camera(sensor, n) for n, sensor in enumerate(sensors)}
         for number, (last, this) in enumerate(pairwise(heads.from_first(sensors)), 1):
-            this_from_last = _FLIP @ np.linalg.inv(this) @ last @ _FLIP
+            this_from_last = OPENCV_AXES @ np.linalg.inv(this) @ last @ OPENCV_AXES
             chain[f"cam{number}"]["T_cn_cnm1"] = (this_from_last + 0.0).tolist()
         text = yaml.safe_dump(chain, default_flow_style=None, width=10**6)
         write_text(folder / "camchain.yaml", text)

@@ -49,6 +49,7 @@ from lightfield.geometry.lenses.equidistant import Equidistant
 from lightfield.geometry.lenses.f_theta import FTheta
 from lightfield.geometry.lenses.kannala_brandt import KannalaBrandt
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.rotations import OPENCV_AXES
 from lightfield.imaging import images
 
 SEQUENCE = "views"
@@ -67,9 +68,6 @@ EXPOSURE = 500_000
 # NCore inverts r(θ) by so many steps. Rays may miss a lens by so many pixels.
 _NEWTON_STEPS = 3
 _MOST_MISS = 0.25
-
-# From Blender's camera (y up, looks along −z) to NCore's (y down, looks along z).
-_FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -379,7 +377,7 @@ def _poses(frames: Sequence[TimedView]) -> dict[str, Any]:
     """Return the poses of a camera by their times."""
     matrices = [matrix for frame in frames for matrix in frame.poses.values()]
     return {
-        "poses": [(matrix @ _FLIP).tolist() for matrix in matrices],
+        "poses": [(matrix @ OPENCV_AXES).tolist() for matrix in matrices],
         "timestamps_us": [time for frame in frames for time in frame.poses],
         "dtype": "float64",
     }

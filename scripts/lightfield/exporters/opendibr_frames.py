@@ -11,8 +11,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from lightfield.core.files import write_json
 from lightfield.export.sequence import SourceSequence
 from lightfield.export.source import Floats
@@ -20,9 +18,8 @@ from lightfield.exporters.base import AnimationRate, odd_size_refusal
 from lightfield.exporters.opendibr import LOADER, TO_OPENGL, OpenDibrViews, hevc_refusal
 from lightfield.geometry.lenses import Lens
 from lightfield.geometry.lenses.rectilinear import Rectilinear
+from lightfield.geometry.rotations import OPENCV_AXES
 
-# From Blender's camera (y up, looks along −z) to dyn-lf-renderer's.
-_FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 # The keys of a camera that both programs have.
 _SHARED_KEYS = ("NameColor", "NameDepth", "Resolution", "Focal", "Depth_range")
 
@@ -54,7 +51,7 @@ class OpenDibrFrames(OpenDibrViews):
 
 def _camera(entry: Mapping[str, Any], world_from_camera: Floats) -> dict[str, Any]:
     """Return dyn-lf-renderer's entry of a camera, by OpenDIBR's ``entry``."""
-    model = world_from_camera @ _FLIP
+    model = world_from_camera @ OPENCV_AXES
     model[:3] = TO_OPENGL @ model[:3]
     shared = {key: entry[key] for key in _SHARED_KEYS}
     return {**shared, "Principal_point": entry["Principle_point"], "model": model.tolist()}

@@ -5,10 +5,14 @@ Source: COLMAP's format.rst.
 
 import numpy as np
 
-from lightfield.geometry.rotations import Floats, matrix_to_quaternion, quaternion_to_matrix
+from lightfield.geometry.rotations import (
+    OPENCV_AXES,
+    Floats,
+    matrix_to_quaternion,
+    quaternion_to_matrix,
+)
 
-# From Blender's camera (y up, looks along −z) to COLMAP's (y down, looks along z).
-_FLIP = np.diag([1.0, -1.0, -1.0])
+_FLIP = OPENCV_AXES[:3, :3]
 
 
 def pose(world_from_camera: Floats) -> tuple[list[float], list[float]]:

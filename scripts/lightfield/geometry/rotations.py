@@ -13,6 +13,10 @@ Bools = NDArray[np.bool_]
 # Files and Blender round numbers. An element of a matrix may differ by this much from a rotation's.
 TOLERANCE = 1e-4
 
+# The axes of a camera of computer vision (x right, y down, z forward) in Blender's (x right, y up,
+# z backward).
+OPENCV_AXES = np.diag([1.0, -1.0, -1.0, 1.0])
+
 
 def is_skewed(matrix: Floats) -> Bools:
     """Return which matrices (…, 3, 3) scale or shear. NaN does not."""

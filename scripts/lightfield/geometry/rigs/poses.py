@@ -37,13 +37,13 @@ from lightfield.geometry.frames import (
 from lightfield.geometry.rigs.rig import Rig, UnitPoses
 from lightfield.geometry.rigs.trajectories import (
     FORMATS,
-    OPENCV_AXES,
     read_kubric,
     read_trajectory,
     refuse_others,
     unit,
 )
 from lightfield.geometry.rotations import (
+    OPENCV_AXES,
     TOLERANCE,
     Floats,
     euler_to_matrix,

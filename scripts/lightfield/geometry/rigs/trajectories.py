@@ -13,15 +13,13 @@ import numpy as np
 
 from lightfield.core.errors import UserError
 from lightfield.geometry.frames import Frame, read_numbers
-from lightfield.geometry.rotations import TOLERANCE, Floats, quaternion_to_matrix
+from lightfield.geometry.rotations import OPENCV_AXES, TOLERANCE, Floats, quaternion_to_matrix
 
 FORMATS = (
     "poses may be in a lightfield.json, a transforms.json, COLMAP's images.txt or images.bin, a "
     "trajectory of KITTI or TUM (.txt), Kubric's metadata.json, or a CSV with the header "
     "name,x,y,z,rx,ry,rz or name,x,y,z,qw,qx,qy,qz"
 )
-# The axes of a camera of computer vision (x right, y down, z forward) in ours.
-OPENCV_AXES = np.diag([1.0, -1.0, -1.0, 1.0])
 # What a JSON is that has a key, and what a CSV is whose header has a word.
 _OTHER_JSON = {
     "camera_path": "a camera path of nerfstudio, whose world is scaled and turned",
