@@ -12,11 +12,12 @@ Numbers are as in the views: linear light of EXR, or the sRGB pixels of PNG.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 from pydantic import Field
 
 from lightfield.core.files import atomic_path, write_json
@@ -59,22 +60,19 @@ class EpipolarVolumes(Export):
         lightfield = source.lightfield
         views = lightfield.views
         channels = _channels(source)
-        first = source.view(views[0]).image()
-        dtype = first.channels["R"].dtype
         meaning = lightfield.depth if self.depth else None
         entries = []
         progress = Progress(len(views), "epipolar_volumes", "views")
         for number, volume in enumerate(volumes_of(lightfield.world_from_cameras)):
             chosen = [views[index] for index in volume.views.ravel().tolist()]
-            shape = (*volume.views.shape, source.lens.height, source.lens.width)
             name = f"volume_{number}.npy"
             pages = (_pixels(source, view, channels, progress) for view in chosen)
-            _write_array(folder / name, (*shape, len(channels)), dtype, pages)
+            _write_array(folder / name, volume.views.shape, pages)
             entry = {"file": name, "axes": [*volume.axes, "y", "x", "channel"]}
             if meaning:
                 entry["depth"] = f"depth_{number}.npy"
-                depths = (source.depth(view, meaning) for view in chosen)
-                _write_array(folder / f"depth_{number}.npy", shape, np.float32, depths)
+                depths = (source.depth(view, meaning).astype(np.float32) for view in chosen)
+                _write_array(folder / f"depth_{number}.npy", volume.views.shape, depths)
             names = np.array([view.name for view in views])[volume.views]
             positions = lightfield.world_from_cameras[volume.views, :3, 3]
             entry |= {"views": names.tolist(), "positions": positions.tolist()}
@@ -155,14 +153,16 @@ def _pixels(source: SourceDataset, view: View, channels: str, progress: Progress
     return np.dstack([colour, planes.get("A", opaque)]).astype(dtype)
 
 
-def _write_array(
-    path: Path, shape: tuple[int, ...], dtype: DTypeLike, pages: Iterator[NDArray[Any]]
-) -> None:
-    """Write an array of NumPy page by page, so that it need not fit in memory."""
-    kind = np.dtype(dtype).newbyteorder("<")
-    header = {"descr": kind.str, "fortran_order": False, "shape": shape}
+def _write_array(path: Path, shape: tuple[int, ...], pages: Iterator[NDArray[Any]]) -> None:
+    """Write ``pages`` as an array of NumPy, one after the other: it need not fit in memory.
+
+    ``shape`` is the array's without its pages. The first page has their type.
+    """
+    first = next(pages)
+    kind = first.dtype.newbyteorder("<")
+    header = {"descr": kind.str, "fortran_order": False, "shape": (*shape, *first.shape)}
     npy: Any = np.lib.format  # without types in older versions of NumPy
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         npy.write_array_header_1_0(file, header)
-        for page in pages:
+        for page in chain([first], pages):
             file.write(np.ascontiguousarray(page, kind).tobytes())
